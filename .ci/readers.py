@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Runs the readers of docs/results.md, in NumPy and where GNU Octave is installed in MATLAB's language, on runs of shipped models: the
-intervals that they print are those of result.json. A model with more parameters has its covariance in a file.
+intervals that they print are those of result.json.
 
 Usage: .ci/readers.py KMCFIT
 """
@@ -15,24 +15,6 @@ import sys
 import tempfile
 
 MODELS = ["accelerometer", "hammer-and-shaker", "roll-decay", "spline"]
-
-
-# A mass on 80 knots.
-LARGE = """
-format: 1
-title: many parameters
-experiments:
-  - name: free decay
-    data: {data}/noisy.csv
-    columns: {{time: t_s, displacement: y_m}}
-    sigma: {{displacement: 0.1}}
-    initial: {{displacement: 3.3, velocity: 1.0}}
-grid: {{nodes: 2000, method: midpoint}}
-functions:
-  mass:      {{basis: b-spline, knots: 80, start: 2.0, penalty: {{kind: tikhonov, order: 2, weight: reml}}}}
-  damping:   {{basis: constant, start: 0.1}}
-  stiffness: {{fixed: 1.0}}
-"""
 
 
 def readers(root):
@@ -91,13 +73,6 @@ def main(program):
             if shutil.which("octave-cli"):
                 by_octave += check(octave(matlab, run), run, 24)
     assert checked >= 12, checked
-    with tempfile.TemporaryDirectory() as folder:
-        model, run = (pathlib.Path(folder) / name for name in ("large.yaml", "run"))
-        model.write_text(LARGE.format(data=root / "data"))
-        fit(program, model, run, "--tables")
-        found = check(printed(python, run), run, 44)
-        assert found >= 4, found
-        checked += found
     print(f"{checked} intervals computed again by NumPy, {by_octave} by Octave")
 
 

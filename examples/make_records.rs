@@ -5,9 +5,10 @@
 
 use kmcfit::results::write_whole;
 use kmcfit_core::ChannelKind;
-use kmcfit_core::internals::simulate::{Trajectory, reference};
+use kmcfit_core::internals::step::{Trajectory, observe};
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System, Term,
+    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
     TimePoint,
 };
 use rand::SeedableRng;
@@ -27,7 +28,7 @@ type Function<'a> = &'a dyn Fn(f64) -> f64;
 /// A system, its input and the duration of its record.
 struct Run<'a> {
     mass: f64,
-    terms: Vec<(Term, Function<'a>)>,
+    terms: Vec<(Law, Function<'a>)>,
     force: Option<Function<'a>>,
     /// Acceleration of the base, m/s^2.
     base: Option<Function<'a>>,
@@ -79,7 +80,7 @@ impl Run<'_> {
             let place = TimePoint::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
             let excitation = Some(&excitation);
-            reference::observe(&system, kind, &nodal, excitation, &response, place, around).value
+            observe(&system, kind, &nodal, excitation, &response, place, around).value
         });
         let acceleration = acceleration.collect();
         (
@@ -110,8 +111,8 @@ fn state(displacement: f64, velocity: f64) -> State {
     }
 }
 
-fn linear<'a>(c: Function<'a>, k: Function<'a>) -> Vec<(Term, Function<'a>)> {
-    vec![(Term::Damping, c), (Term::Stiffness, k)]
+fn linear<'a>(c: Function<'a>, k: Function<'a>) -> Vec<(Law, Function<'a>)> {
+    vec![(Law::Damping, c), (Law::Stiffness, k)]
 }
 
 /// A ring-down of 2 kg on a spring that softens from 3000 to 2700 N/m, c = 1.2 N s/m, read in g at
@@ -204,7 +205,7 @@ pub fn duffing() -> String {
             + 2.0 * libm::sin(TAU * 1.3 * t + 2.0)
     };
     let mut terms = linear(&|_| 0.4, &|_| 10.0);
-    terms.push((Term::CubicStiffness, &|_| 30.0));
+    terms.push((Law::CubicStiffness, &|_| 30.0));
     let run = Run {
         mass: 1.0,
         terms,
@@ -222,7 +223,7 @@ pub fn duffing() -> String {
 pub fn friction() -> String {
     let force = |t: f64| 6.0 * libm::sin(TAU * 0.5 * t);
     let mut terms = linear(&|_| 0.3, &|_| 40.0);
-    terms.push((Term::CoulombFriction { width: 0.01 }, &|_| 2.0));
+    terms.push((Law::CoulombFriction { width: 0.01 }, &|_| 2.0));
     let run = Run {
         mass: 1.0,
         terms,
@@ -251,8 +252,8 @@ fn with_force(run: &Run, force: Function, sigma: f64, seed: u64) -> String {
 /// damping 3, cubic stiffness 60), in degrees with noise of 0.02 degrees.
 pub fn roll() -> String {
     let mut terms = linear(&|_| 0.4, &|_| 130.0);
-    terms.push((Term::CubicStiffness, &|_| 60.0));
-    terms.push((Term::QuadraticDamping, &|_| 3.0));
+    terms.push((Law::CubicStiffness, &|_| 60.0));
+    terms.push((Law::QuadraticDamping, &|_| 3.0));
     let run = Run {
         mass: 20.0,
         terms,

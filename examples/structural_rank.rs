@@ -3,7 +3,7 @@
 
 use kmcfit_core::internals::identifiability::{ScaleFreedom, structural_rank};
 use kmcfit_core::{Builder, CoefficientSpec, Record};
-use kmcfit_core::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
+use kmcfit_core::{Excitation, Grid, Law, Method, NodalCoefficients, State, System};
 use std::error::Error;
 
 /// Structural rank of the free record and of the pair, each with `true` if a common factor of all functions is
@@ -14,7 +14,7 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let nodes = grid.nodes();
     let nodal = NodalCoefficients {

@@ -7,10 +7,9 @@ use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::study::multistart::{Multistart, Ranges};
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -30,7 +29,7 @@ pub fn paper(nodes: usize) -> Problem {
     let system = System {
         grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
         method: Method::Midpoint,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let grid = system.grid;
     let weighting = Weighting::Integral {
@@ -133,7 +132,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        terms: vec![Law::Damping, Law::Stiffness, Law::CubicStiffness],
     };
     let rest = State {
         displacement: 0.0,

@@ -37,6 +37,15 @@ pub(super) fn run(path: &Path) -> Result<u8, InputError> {
     for note in tables.first().map_or(&[][..], Table::notes) {
         text += &format!("note: {note}\n");
     }
+    for table in &tables {
+        for index in 0..table.width() {
+            if let stated @ [_, ..] = table.unapplied(index) {
+                let (name, stated) = (table.label(index), stated.join(", "));
+                text +=
+                    &format!("note: `{name}`: the file states {stated}, which is not applied\n");
+            }
+        }
+    }
     for other in tables.first().map_or(&[][..], Table::unusable) {
         text += &format!("not usable: `{}`, {}\n", other.name, other.content);
         if let Some(hint) = &other.hint {

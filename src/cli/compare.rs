@@ -6,7 +6,7 @@ use super::{
     CommandError, NOT_CONVERGED, OK, Overrides, exit_code, inputs, interrupt, note_changes, print,
     say, stem, unwritable,
 };
-use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{RequestedFiles, json};
@@ -40,22 +40,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     }
     let entries = entries(&arguments.runs, &set, &arguments.out)?;
     let folder = OutputFolder::prepare(&arguments.out, "compare", files(&entries))?;
-    let comparison = compared(entries, &folder, "", None)?;
-    finish(&comparison, &folder, arguments.json, None)
-}
-
-/// Fits the models of a sequence one after another and compares them on one page.
-pub(super) fn run_sequence(
-    path: &Path,
-    sequence: &Sequence,
-    out: &Path,
-    as_json: bool,
-) -> Result<u8, CommandError> {
-    let entries = entries(&sequence.models, &[], out)?;
-    let inputs = files(&entries).into_iter().chain([path.to_path_buf()]);
-    let folder = OutputFolder::prepare(out, "compare", inputs)?;
-    let comparison = compared(entries, &folder, "", Some(&sequence.title))?;
-    finish(&comparison, &folder, as_json, Some(&sequence.title))
+    let comparison = compared(entries, &folder, "")?;
+    finish(&comparison, &folder, arguments.json)
 }
 
 /// The files that a comparison reads.
@@ -149,7 +135,6 @@ pub(super) fn compared(
     entries: Vec<(String, Entry)>,
     folder: &OutputFolder,
     inside: &str,
-    title: Option<&str>,
 ) -> Result<Comparison, CommandError> {
     let flag = interrupt::flag();
     let (mut runs, mut left_out) = (Vec::new(), Vec::new());
@@ -173,10 +158,7 @@ pub(super) fn compared(
         }
     }
     let _comparing = Activity::begin("comparing");
-    let mut comparison = Comparison::new(runs, left_out);
-    if let Some(title) = title {
-        comparison = comparison.titled(title);
-    }
+    let comparison = Comparison::new(runs, left_out);
     let write = |name: &str, bytes: &[u8]| folder.write(&format!("{inside}{name}"), bytes);
     let written = comparison.write(&write);
     written.map_err(|error| unwritable(folder.shown(), &error))?;
@@ -209,22 +191,20 @@ fn fitted(
     }
 }
 
-/// Prints a comparison, below a title if it has one; the exit code is that of success if every run converged or completed.
+/// Prints a comparison; the exit code is that of success if every run converged or completed.
 fn finish(
     comparison: &Comparison,
     folder: &OutputFolder,
     as_json: bool,
-    title: Option<&str>,
 ) -> Result<u8, CommandError> {
     let written = folder.commit(&comparison.document());
     written.map_err(|error| unwritable(folder.shown(), &error))?;
     match as_json {
         true => print(&json(&comparison.document())),
         false => {
-            let title = title.map_or_else(String::new, |title| format!("{title}\n\n"));
             let page = folder.shown().join("compare.html");
             let text = comparison.text();
-            print(&format!("{title}{text}\nPage   {}\n", page.display()));
+            print(&format!("{text}\nPage   {}\n", page.display()));
         }
     }
     Ok(exit_code_of(comparison))

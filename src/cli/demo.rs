@@ -9,7 +9,8 @@ use crate::report::compare::{Comparison, Measures};
 use crate::report::document::{Verdict, level_in_words};
 use crate::report::{CsvTable, Run};
 use crate::results::OutputFolder;
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -42,7 +43,7 @@ fn tables() -> Result<[String; 2], CommandError> {
     let system = System {
         grid,
         method: Method::Midpoint,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let initial = State {
         displacement: 3.3,
@@ -106,15 +107,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .into_iter()
         .map(entry)
         .collect::<Result<Vec<_>, InputError>>()?;
-    let title = "The paper's record, fitted twice";
-    let comparison = compared(entries, &folder, "results/", Some(title))?;
+    let comparison = compared(entries, &folder, "results/")?;
     folder.commit(&comparison.document()).map_err(full)?;
     print(INTRODUCTION);
     print(&screen(&comparison));
     let place = out.display();
     print(&format!(
         "\nPage   {place}/results/compare.html\n\
-         Next   edit {place}/models/physical.yaml and run `kmcfit fit {place}/models/physical.yaml`\n"
+         Next   change a key: `kmcfit fit {place}/models/physical.yaml --set functions.damping.penalty.weight=0.01`\n"
     ));
     Ok(exit_code_of(&comparison))
 }

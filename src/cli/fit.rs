@@ -5,7 +5,7 @@ use super::{
     CommandError, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
 use crate::config::{BuildMode, Model, ModelFile, Source, Statements, build, is_record, scaffold};
-use crate::error::InputError;
+use crate::error::{InputError, Location};
 use crate::fitting::fit_or_no_response;
 use crate::report::document::{FailureDocument, ResultDocument};
 use crate::report::trial::advice;
@@ -97,7 +97,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         strict: arguments.strict,
     };
     let out = arguments.out.clone().unwrap_or_else(own);
-    let mut model = read(&file)?;
+    // The model of a record stands in no file yet.
+    let of_record = |error: InputError| match &error.place {
+        Location::Line { file, .. } if is_record(&arguments.model) && !file.exists() => {
+            let made = format!(
+                "`kmcfit init {}` writes the model",
+                arguments.model.display()
+            );
+            InputError {
+                place: Location::File(arguments.model.clone()),
+                ..error.hint(made)
+            }
+        }
+        _ => error,
+    };
+    let mut model = read(&file).map_err(of_record)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(&out, "fit", inputs(&file))?;
     announce(&model);

@@ -1,7 +1,7 @@
 //! `kmcfit fleet`: fits one model to many records.
 
 use super::progress::{Activity, show_jobs};
-use super::{CommandError, OK, Overrides, interrupt, print, say};
+use super::{CommandError, NOT_CONVERGED, OK, Overrides, interrupt, print, say};
 use crate::fleet::{FleetFolder, RecordList, Trend, check_model, finish, run as fit_records};
 use std::path::PathBuf;
 
@@ -62,5 +62,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         return Ok(interrupt::exit_code());
     }
     print(&finish(&folder, &list, &trend)?);
-    Ok(OK)
+    let mut rows = list.records.iter().filter_map(|r| folder.row(&r.name));
+    match rows.any(|row| row.error.is_none()) {
+        true => Ok(OK),
+        false => Ok(NOT_CONVERGED),
+    }
 }

@@ -1,12 +1,11 @@
-//! `kmcfit study`: runs the analyses of a fit, or compares a sequence of models.
+//! `kmcfit study`: runs the analyses of a fit.
 
-use super::compare::run_sequence;
 use super::fit::read;
 use super::study_run::StudyTask;
 use super::{
     CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, stem,
 };
-use crate::config::{BuildMode, Model, ModelFile, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, build};
 use crate::error::InputError;
 use crate::report::study::{StudiedFit, StudyDocument};
 use crate::report::{Run, json};
@@ -20,7 +19,7 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kmcfit study model.yaml --threads 4")]
 pub struct Arguments {
-    /// Model file or sequence (YAML), or the folder of a finished run, whose fit is studied.
+    /// Model file (YAML), or the folder of a finished run, whose fit is studied.
     model: PathBuf,
     /// Folder for the results [default: runs/NAME-study].
     #[arg(long)]
@@ -41,23 +40,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from("runs").join(format!("{}-study", stem(&arguments.model))));
-    if arguments.model.is_dir() {
-        let run = Run::open(&arguments.model)?;
-        let file = run.model_file()?;
-        super::note_changes(&run);
-        let file = file.with_overrides(&arguments.set.parse()?)?;
-        return run_in(&file, &out, arguments.json, threads);
-    }
-    match Sequence::read(&arguments.model)? {
-        Some(sequence) => {
-            arguments.set.refuse("a sequence")?;
-            run_sequence(&arguments.model, &sequence, &out, arguments.json)
+    let file = match arguments.model.is_dir() {
+        true => {
+            let run = Run::open(&arguments.model)?;
+            let file = run.model_file()?;
+            super::note_changes(&run);
+            file.with_overrides(&arguments.set.parse()?)?
         }
-        None => {
-            let file = arguments.set.read(&arguments.model)?;
-            run_in(&file, &out, arguments.json, threads)
-        }
-    }
+        false => arguments.set.read(&arguments.model)?,
+    };
+    run_in(&file, &out, arguments.json, threads)
 }
 
 pub(super) fn threads(asked: Option<usize>) -> Result<usize, InputError> {

@@ -3,7 +3,6 @@
 use super::fit::{RunPlace, fit_into, read};
 use super::progress::Progress;
 use super::{CommandError, NOT_CONVERGED, OK, print, unwritable};
-use crate::digest::digest_of_file;
 use crate::error::InputError;
 use crate::report::{RequestedFiles, Run};
 use crate::results::{OutputFolder, RESULT};
@@ -33,7 +32,7 @@ const LEFT_OUT: [&str; 6] = ["seconds", "timings", "version", "files", "folder",
 const MOST_SHOWN: usize = 20;
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
-    let run = Run::open(&arguments.run)?;
+    let run = Run::open_edited(&arguments.run)?;
     let file = run.model_file()?;
     let model = read(&file)?;
     let requested = RequestedFiles {
@@ -89,15 +88,9 @@ impl Compared {
 
     /// Adds files that are not as they were written, such as the page.
     fn changed(&mut self, run: &Run) {
-        let listed = run.value["files"].as_object();
-        for (name, digest) in listed.into_iter().flatten() {
-            let is_same =
-                digest_of_file(&run.folder.join(name)).is_ok_and(|found| *digest == found);
-            if !is_same {
-                self.differences
-                    .push(format!("{name}: not as it was written"));
-            }
-        }
+        let edited = run.edited_files();
+        let edited = edited.map(|name| format!("{name}: not as it was written"));
+        self.differences.extend(edited);
     }
 
     /// Compares two values at a place; `floor` is a difference of numbers that is rounding.

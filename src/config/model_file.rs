@@ -178,11 +178,7 @@ impl ModelFile {
 
     /// The model with the overrides applied as JSON: its keys, with the values of all anchors and merges.
     pub fn to_json(&self) -> String {
-        // The text was parsed before, so neither step fails.
-        let value = Checked::new(&self.path, self.effective_text())
-            .ok()
-            .and_then(|text| text.read::<serde_yaml::Value>().ok());
-        serde_json::to_string(&value).unwrap_or_default()
+        serde_json::to_string(&self.value()).unwrap_or_default()
     }
 
     /// The overrides as they were written.
@@ -297,14 +293,27 @@ impl ModelFile {
     /// The values of all keys `data` that name a file, each once, in the order of the text.
     pub(super) fn data_names(&self) -> Vec<String> {
         let mut names = Vec::new();
-        // The text was parsed before, so neither step fails.
-        let value = Checked::new(&self.path, self.effective_text())
-            .ok()
-            .and_then(|text| text.read().ok());
-        if let Some(value) = value {
-            collect_data(&value, &mut names);
+        collect_data(&self.value(), &mut names);
+        names
+    }
+
+    /// Those of the records, without the coefficients of experiments.
+    pub fn record_names(&self) -> Vec<String> {
+        let mut value = self.value();
+        let list = value.get_mut("experiments");
+        let list = list.and_then(|list| list.as_sequence_mut());
+        let mut names = Vec::new();
+        for experiment in list.into_iter().flatten() {
+            (experiment.as_mapping_mut()).and_then(|keys| keys.remove("functions"));
+            collect_data(experiment, &mut names);
         }
         names
+    }
+
+    /// The model with the overrides applied; it was parsed before, so no step fails.
+    fn value(&self) -> serde_yaml::Value {
+        let text = Checked::new(&self.path, self.effective_text()).ok();
+        text.and_then(|text| text.read().ok()).unwrap_or_default()
     }
 
     /// A path in the model file, relative to its folder.
@@ -336,7 +345,7 @@ fn collect_data(value: &serde_yaml::Value, names: &mut Vec<String>) {
     }
 }
 
-/// Refuses a path that is not UTF-8: results and journals, which are UTF-8, name the model by its path.
+/// Refuses a path that is not UTF-8: results, which are UTF-8, name the model by its path.
 pub(super) fn check_path(path: &Path) -> Result<(), InputError> {
     match path.to_str() {
         Some(_) => Ok(()),

@@ -82,7 +82,10 @@ impl YamlError<'_> {
                 found,
                 expected,
                 hint,
-            } => match successor(self.key, found.trim_matches('`')) {
+            } => match successor(
+                self.key,
+                found.trim_start_matches("text ").trim_matches('`'),
+            ) {
                 Some(successor) => {
                     let error = self.here("this choice was removed").found(found);
                     error.expected(expected).hint(successor)
@@ -114,9 +117,6 @@ impl YamlError<'_> {
             .expected(one_of(known.iter().copied()));
         match key {
             "<<" => error.hint("merging maps by `<<` is not supported: write the keys out"),
-            "sequence" if self.key.is_empty() => {
-                error.hint("a file with a `sequence` is for `kmcfit study`")
-            }
             "dt" if self.key == "grid" => {
                 error.hint("the step follows from the others: dt = duration/(nodes - 1)")
             }

@@ -116,7 +116,7 @@ impl FleetFolder {
             true => Ok(()),
             false => Err(InputError::file(
                 &record.path,
-                "this record has changed since its row was written",
+                "this record or its values in the table have changed since its row was written",
             )
             .expected("the records of the rows that are there")
             .hint(format!(
@@ -167,9 +167,13 @@ fn check(path: &Path, identity: &FleetIdentity) -> Result<(), InputError> {
     }
     let text = read_text(&file, "the identity of a fleet", LONGEST_TABLE)?;
     let known: FleetIdentity = serde_json::from_str(&text).map_err(|error| {
-        InputError::file(&file, "this is not the identity of a fleet of this version")
-            .found(error)
-            .expected("a folder of its own for the fleet")
+        InputError::file(
+            &file,
+            "this is no fleet, or one of an earlier version of kmcfit",
+        )
+        .found(error)
+        .expected("a folder of its own for the fleet")
+        .hint("fit the records again into another folder with --out")
     })?;
     if known.version == identity.version && known.sha256 == identity.sha256 {
         return Ok(());

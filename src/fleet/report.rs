@@ -226,8 +226,12 @@ fn trend_figure(distribution: &Distribution, trend: &Trend) -> Figure {
     let dots = Style::new(Colour::nth(0)).width(4.0);
     let text = "Each record, and the line with the median slope of all pairs of records.";
     let title = format!("{name} over {}", trend.name);
+    // Dots at the ends stand inside the frame.
+    let (first, last) = (x.first(), x.last());
+    let [low, high] = [first, last].map(|end| end.copied().unwrap_or_default());
+    let room = 0.02 * (high - low);
     let panel = Panel::new(
-        Axis::linear(trend.name.clone(), ""),
+        Axis::linear(trend.name.clone(), "").limits(low - room, high + room),
         Axis::linear(name, distribution.unit.clone()),
     );
     Figure::new(format!("trend-{}", distribution.name), title, text).panel(

@@ -7,12 +7,12 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-use hdf5_pure::{AttrValue, Dataset, Datatype, File, Group, Layout, Object};
+use hdf5_pure::{AttrValue, Dataset, File, Group, Layout, Object};
 
 use super::array::Array;
 use super::budget::{Budget, damaged};
+use super::hdf5_fields::{add_attributes, fields, numbers};
 use super::hdf5_guards::{Missing, remove_soft_links};
-use super::hdf5_number::Number;
 use super::stated::{self, Meaning, Stated};
 use super::{Channels, Format, mat_class, refused};
 use crate::error::InputError;
@@ -24,8 +24,8 @@ pub(super) const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 const FILL: f64 = 9.969_209_968_386_869e36;
 /// Deepest nesting of groups and cells: hard links can form circles.
 const DEEPEST: usize = 32;
-/// Groups of MATLAB with the targets of references and the data of objects.
-const INTERNAL: [&str; 2] = ["#refs#", "#subsystem#"];
+/// Beginnings of groups of MATLAB with the targets of references and the data of objects, and of PyTables with the orders of columns.
+const INTERNAL: [&str; 3] = ["#refs#", "#subsystem#", "_i_"];
 /// Classes of MATLAB whose data are numbers.
 const NUMERIC: [&str; 11] = [
     "double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
@@ -63,7 +63,7 @@ struct Reader<'a, 'b> {
 }
 
 /// Why a data set is not read.
-enum Unread {
+pub(super) enum Unread {
     /// Content, as a noun, and remedy.
     Content(String, Option<&'static str>),
     /// A structure that the library does not read, or damage.
@@ -84,11 +84,11 @@ impl From<InputError> for Unread {
     }
 }
 
-fn content(noun: &str, hint: Option<&'static str>) -> Unread {
+pub(super) fn content(noun: &str, hint: Option<&'static str>) -> Unread {
     Unread::Content(noun.to_owned(), hint)
 }
 
-type Attributes = HashMap<String, AttrValue>;
+pub(super) type Attributes = HashMap<String, AttrValue>;
 
 /// What MATLAB says of a variable.
 struct Class<'a> {
@@ -113,7 +113,7 @@ impl Reader<'_, '_> {
         };
         self.stated.push(stated);
         for (own, member) in members {
-            if !(name.is_empty() && INTERNAL.contains(&own.as_str())) {
+            if !INTERNAL.iter().any(|internal| own.starts_with(internal)) {
                 let path = joined(name, &own);
                 self.budget.name(&path)?;
                 self.object(&member, &path, depth)?;
@@ -254,7 +254,12 @@ impl Reader<'_, '_> {
         let (factor, offset) = (scale(Meaning::Factor, 1.0), scale(Meaning::Offset, 0.0));
         let mut stated = self.stated.last().cloned().unwrap_or_default();
         add_attributes(&mut stated, attributes);
-        for (field, number, at) in &fields {
+        let units = units.unwrap_or_default();
+        let of_fields = units.len() == fields.len();
+        if let (Some((Some(_), ..)), false, [unit, ..]) = (fields.first(), of_fields, units) {
+            stated.unapplied.push(format!("the unit {unit} of a table"));
+        }
+        for (place, (field, number, at)) in fields.iter().enumerate() {
             let value = |i: usize| {
                 let own = bytes.get(i * size + at..).unwrap_or_default();
                 let value = number.value(own);
@@ -275,8 +280,9 @@ impl Reader<'_, '_> {
                 value: &value,
             };
             let (name, units) = match field {
+                Some(field) if of_fields => (joined(name, field), &units[place..=place]),
                 Some(field) => (joined(name, field), &[][..]),
-                None => (name.to_owned(), units.unwrap_or_default()),
+                None => (name.to_owned(), units),
             };
             let before = self.channels.channels.len();
             array.add_to(&mut self.channels, &name, units, self.budget)?;
@@ -368,68 +374,6 @@ impl Reader<'_, '_> {
             self.object(object, &path, depth + 1)?;
         }
         Ok(())
-    }
-}
-
-/// Name, form and place of the numbers of an element, without a name for one that is a number itself; `None` for references.
-#[expect(clippy::type_complexity, reason = "named once")]
-fn fields(kind: &Datatype) -> Result<Option<Vec<(Option<String>, Number, usize)>>, Unread> {
-    let members = match kind {
-        Datatype::Reference { .. } => return Ok(None),
-        Datatype::Compound { members, .. } => members,
-        Datatype::String { .. }
-        | Datatype::VariableLength {
-            is_string: true, ..
-        } => return Err(content("texts", None)),
-        kind => {
-            let number = Number::of(kind);
-            let number =
-                number.ok_or_else(|| content("data of another type than numbers", None))?;
-            return Ok(Some(vec![(None, number, 0)]));
-        }
-    };
-    if (members.first()).is_some_and(|first| ["r", "real"].contains(&first.name.as_str())) {
-        let hint = "save the real samples in time, for instance `real(x)`";
-        return Err(content("complex numbers", Some(hint)));
-    }
-    let numbers = members.iter().filter_map(|member| {
-        let at = usize::try_from(member.byte_offset).ok()?;
-        Some((Some(member.name.clone()), Number::of(&member.datatype)?, at))
-    });
-    let numbers: Vec<_> = numbers.collect();
-    match numbers.is_empty() {
-        true => Err(content("a table without numbers", None)),
-        false => Ok(Some(numbers)),
-    }
-}
-
-/// The numbers of an attribute, also of one that is a text.
-fn numbers(value: &AttrValue) -> Vec<f64> {
-    let integers = || Some(value.to_i64s()?.into_iter().map(|x| x as f64).collect());
-    let texts = || {
-        value
-            .as_strings()?
-            .iter()
-            .map(|text| text.trim().parse().ok())
-            .collect()
-    };
-    value
-        .to_f64s()
-        .or_else(integers)
-        .or_else(texts)
-        .unwrap_or_default()
-}
-
-fn add_attributes(stated: &mut Stated, attributes: &Attributes) {
-    let mut all: Vec<(&String, &AttrValue)> = attributes.iter().collect();
-    all.sort_by_key(|(name, _)| *name);
-    for (name, value) in all {
-        let text = match (value.as_str(), numbers(value).as_slice()) {
-            (Some(text), _) => text.to_owned(),
-            (None, [one]) => one.to_string(),
-            (None, several) => format!("{several:?}"),
-        };
-        stated.add(name, &text);
     }
 }
 

@@ -5,7 +5,7 @@ use hdf5_pure::{Datatype, DatatypeByteOrder, FixedPointLayout, FloatingPointLayo
 /// Form of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Number {
-    size: usize,
+    pub size: usize,
     is_big: bool,
     layout: Layout,
 }

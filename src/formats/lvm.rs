@@ -75,10 +75,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
             if line.trim().is_empty() {
                 break;
             }
-            for (column, (text, own)) in fields(line).iter().zip(&mut columns).enumerate() {
+            let fields = fields(line);
+            for (column, own) in columns.iter_mut().enumerate() {
+                let text = fields.get(column).map_or("", String::as_str);
                 match number(text) {
                     Some(value) => own.push(value),
-                    None if text.is_empty() => {}
+                    // A missing sample, or the end of a shorter channel.
+                    None if text.is_empty() => own.push(f64::NAN),
                     None => {
                         let name = names.get(column).map_or("", String::as_str);
                         return Err(InputError::line(path, i + 1, 1, "not a number")
@@ -122,7 +125,9 @@ fn segment(
     };
     let number = |key: &str, i: usize| value(key, i)?.replace(',', ".").parse::<f64>().ok();
     let mut channel = 0;
-    for (i, values) in columns.into_iter().enumerate() {
+    for (i, mut values) in columns.into_iter().enumerate() {
+        let last = values.iter().rposition(|x| !x.is_nan());
+        values.truncate(last.map_or(0, |last| last + 1));
         let is_time = match times {
             Times::None | Times::One => i == 0,
             Times::Multi => i % 2 == 0,

@@ -7,6 +7,7 @@ mod array;
 mod budget;
 mod bytes;
 mod hdf5;
+mod hdf5_fields;
 mod hdf5_guards;
 mod hdf5_number;
 mod lvm;
@@ -14,7 +15,6 @@ mod mat5;
 mod mat_class;
 mod npy;
 mod number;
-mod python_literal;
 mod recognise;
 mod refused;
 mod sampling;
@@ -33,6 +33,8 @@ use std::path::Path;
 use budget::Budget;
 pub use recognise::{DATA_EXTENSIONS, Format, has_data_extension, recognise};
 pub use sampling::Sampling;
+pub(crate) use stated::step_of_line;
+pub(crate) use zip::unpacked;
 
 use crate::error::InputError;
 
@@ -49,6 +51,10 @@ pub struct Channel {
     pub values: Vec<f64>,
     /// Scales that the file states and that are not applied.
     pub unapplied: Vec<String>,
+    /// Sampling interval that the file states beside times, s.
+    pub stated_step: Option<f64>,
+    /// Later than the sampling by this fraction of a step, s.
+    pub late: f64,
 }
 
 /// A variable or channel that holds no samples in time, and the reason.
@@ -86,7 +92,7 @@ impl Channels {
             unit: unit.filter(|unit| !unit.trim().is_empty()),
             sampling,
             values,
-            unapplied: Vec::new(),
+            ..Channel::default()
         });
     }
 
@@ -185,10 +191,6 @@ mod tests {
         for name in ["a", "a", "a.2", "a", "b"] {
             channels.push(name, None, None, vec![0.0]);
         }
-        let note = stated::times_of_numbers(&mut channels.channels);
-        channels.notes.extend(note);
-        let note = stated::align(&mut channels.channels);
-        channels.notes.extend(note);
         rename_repeated(&mut channels.channels);
         let names: Vec<&str> = channels.channels.iter().map(|c| &*c.name).collect();
         assert_eq!(names, ["a", "a.3", "a.2", "a.4", "b"]);

@@ -5,12 +5,14 @@
 
 use std::path::Path;
 
+use serde::Deserialize;
+use serde_yaml::Value;
+
 use super::Channels;
 use super::array::Array;
 use super::budget::Budget;
 use super::bytes::Bytes;
 use super::number::{ByteOrder, NumberType};
-use super::python_literal::Literal;
 use crate::error::InputError;
 use crate::text_io::quote;
 
@@ -62,7 +64,7 @@ pub(super) fn add(
     };
     let count = rows.saturating_mul(columns);
     match header.descr {
-        Literal::Text(descr) => match (ticks(&descr), number(&descr)) {
+        Descr::Type(descr) => match (ticks(&descr), number(&descr)) {
             (Some((unit, order)), _) => {
                 let data = bytes.take(count.saturating_mul(8), &what)?;
                 let mut values = budget.list(count as usize)?;
@@ -76,7 +78,7 @@ pub(super) fn add(
                 let array = Array {
                     rows: rows as usize,
                     columns: columns as usize,
-                    column_major: header.is_fortran,
+                    column_major: header.fortran_order,
                     value: &|i| kind.value_at(data, order, i),
                 };
                 array.add_to(channels, name, &[], budget)
@@ -86,19 +88,24 @@ pub(super) fn add(
                 Ok(())
             }
         },
-        Literal::List(fields) => structured(name, &fields, bytes, count, budget, channels),
-        _ => Err(invalid(
-            path,
-            &what,
-            "another type than a text or a list of fields",
-        )),
+        Descr::Fields(fields) => structured(name, &fields, bytes, count, budget, channels),
     }
 }
 
+/// A header, as NumPy writes it.
+#[derive(Debug, Deserialize)]
 struct Header {
-    descr: Literal,
-    is_fortran: bool,
+    descr: Descr,
+    fortran_order: bool,
     shape: Vec<u64>,
+}
+
+/// The type of an array, or the fields of a structured one.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Descr {
+    Type(String),
+    Fields(Vec<Vec<Value>>),
 }
 
 fn header(path: &Path, bytes: &mut Bytes, what: &str) -> Result<Header, InputError> {
@@ -128,20 +135,33 @@ fn header(path: &Path, bytes: &mut Bytes, what: &str) -> Result<Header, InputErr
         .ok_or_else(|| invalid(path, what, &format!("the header {}", quote(text.trim()))))
 }
 
+/// Longest header, bytes: that of the most channels of a file.
+const LONGEST: usize = 1 << 20;
+
+/// Reads a literal of Python, which is YAML but for round brackets and the `L` of Python 2.
 fn parse_header(text: &str) -> Option<Header> {
-    let header = Literal::parse(text)?;
-    let Literal::List(shape) = header.get("shape")? else {
+    if text.len() > LONGEST || text.contains('\\') {
         return None;
-    };
-    let length = |literal: &Literal| match literal {
-        Literal::Integer(length) => Some(*length),
-        _ => None,
-    };
-    Some(Header {
-        descr: header.get("descr")?.clone(),
-        is_fortran: *header.get("fortran_order")? == Literal::Bool(true),
-        shape: shape.iter().map(length).collect::<Option<_>>()?,
-    })
+    }
+    let (mut yaml, mut quote) = (String::new(), None);
+    for c in text.chars() {
+        match quote {
+            Some(open) if open == c => quote = None,
+            None if matches!(c, '\'' | '"') => quote = Some(c),
+            // Aliases of YAML stand for any amount of text.
+            None if matches!(c, '&' | '*') => return None,
+            _ => {}
+        }
+        yaml.push(match (quote, c) {
+            (None, '(') => '[',
+            (None, ')') => ']',
+            (None, 'L') => ' ',
+            _ => c,
+        });
+    }
+    #[expect(clippy::disallowed_methods, reason = "without aliases")]
+    let header = serde_yaml::from_str(&yaml);
+    header.ok()
 }
 
 fn invalid(path: &Path, what: &str, found: &str) -> InputError {
@@ -248,7 +268,7 @@ fn since_first(
 /// Adds the fields of a structured array, each as a channel `name.field`.
 fn structured(
     name: &str,
-    fields: &[Literal],
+    fields: &[Vec<Value>],
     mut bytes: Bytes,
     count: u64,
     budget: &mut Budget,
@@ -257,11 +277,8 @@ fn structured(
     let mut stride = 0;
     let mut used = Vec::new();
     for field in fields {
-        let simple = match field {
-            Literal::List(parts) => match parts.as_slice() {
-                [Literal::Text(field), Literal::Text(descr)] => Some((field, descr)),
-                _ => None,
-            },
+        let simple = match field.as_slice() {
+            [Value::String(field), Value::String(descr)] => Some((field, descr)),
             _ => None,
         };
         let Some((field, (descr, size))) =
@@ -317,5 +334,33 @@ fn size_of_type(descr: &str) -> Option<u64> {
         true => None,
         // A letter takes four bytes.
         false => Some(size * if descr.contains('U') { 4 } else { 1 }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_of_numpy() {
+        let text = "{'descr': [('t (s)', '<f8'), (\"y's\", '<i2', (3,))], 'fortran_order': False, 'shape': (7, 2L), }  \n";
+        let header = parse_header(text).expect("a header");
+        assert_eq!((header.shape, header.fortran_order), (vec![7, 2], false));
+        let Descr::Fields(fields) = header.descr else {
+            panic!("no fields");
+        };
+        assert_eq!(fields[0], ["t (s)", "<f8"].map(Value::from));
+        assert_eq!((fields[1][0].as_str(), fields[1].len()), (Some("y's"), 3));
+        let scalar = parse_header("{'descr': '<f8', 'fortran_order': True, 'shape': ()}");
+        assert!(scalar.is_some_and(|header| header.shape.is_empty()));
+        for text in [
+            "{'descr': &a '<f8', 'fortran_order': False, 'shape': (1,)}",
+            "",
+            "{",
+            "{'descr': '<f8'}",
+            "{'descr': '\\x41', 'fortran_order': False, 'shape': (1,)}",
+        ] {
+            assert!(parse_header(text).is_none(), "{text}");
+        }
     }
 }

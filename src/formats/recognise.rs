@@ -11,7 +11,7 @@ use crate::error::InputError;
 pub enum Format {
     /// Array of NumPy.
     Npy,
-    /// Zip archive of arrays of NumPy.
+    /// Zip archive, of arrays of NumPy unless it holds one other file.
     Npz,
     /// Sound file.
     Wav,
@@ -35,7 +35,7 @@ pub enum Format {
     Hdf5,
     /// Apache Parquet; refused.
     Parquet,
-    /// Compressed by gzip; refused.
+    /// Compressed by gzip; refused inside another one.
     Gzip,
     /// Pickle of Python; refused.
     Pickle,

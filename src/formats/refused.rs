@@ -17,7 +17,7 @@ pub(super) fn whole(path: &Path, format: Format) -> InputError {
         }
         Format::Mat4 => "save it with `save('record.mat', '-v7')` in MATLAB",
         Format::TdmsIndex => "read the file with the ending .tdms beside it",
-        Format::Gzip => "decompress it: `gunzip FILE`",
+        Format::Gzip => "decompress it twice: `gunzip FILE`",
         Format::Pickle => {
             "a pickle can run code: save the numbers with `numpy.savez(file, t=t, y=y)`"
         }

@@ -23,12 +23,16 @@ impl Sampling {
 
     /// These times, later by `late` (s).
     pub(super) fn later(self, late: f64) -> Self {
-        let (start, step) = match self {
-            Self::Rate(rate) => (0.0, 1.0 / rate),
-            Self::Interval { start, step } => (start, step),
-        };
-        let start = start + late;
+        let (start, step) = (self.time(0) + late, self.step());
         Self::Interval { start, step }
+    }
+
+    /// Sampling interval, s.
+    pub(super) fn step(self) -> f64 {
+        match self {
+            Self::Rate(rate) => 1.0 / rate,
+            Self::Interval { step, .. } => step,
+        }
     }
 
     /// Time of sample i, s.

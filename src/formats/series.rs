@@ -7,7 +7,7 @@ use super::{Channels, Sampling};
 use crate::error::InputError;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
-use crate::units::Unit;
+use crate::units::{Quantity, Unit};
 
 /// Length of the examined beginning of a file, bytes.
 const BEGINNING: usize = 1 << 14;
@@ -181,14 +181,9 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
 }
 
 /// The quantity of a unit other than a time.
-fn unit_kind(unit: &str) -> Option<crate::units::Quantity> {
-    use crate::units::Quantity;
-    let kinds = Quantity::ALL
-        .into_iter()
-        .filter(|kind| *kind != Quantity::Time);
-    kinds
-        .into_iter()
-        .find(|kind| Unit::recognise(*kind, unit).is_some())
+fn unit_kind(unit: &str) -> Option<Quantity> {
+    let is_of = |kind: &Quantity| *kind != Quantity::Time && Unit::recognise(*kind, unit).is_some();
+    Quantity::ALL.into_iter().find(is_of)
 }
 
 /// Factor and unit of `3920(gal)/6182761`.

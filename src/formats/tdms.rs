@@ -339,11 +339,16 @@ impl Track {
         }
         let mut stated = Stated::default();
         for (name, value) in file.iter().chain(group).chain(&self.properties) {
-            match value {
-                Property::Number(number) => stated.add(name, &number.to_string()),
-                Property::Text(text) => stated.add(name, text),
-                Property::Time(..) | Property::Other => {}
+            let value = match value {
+                Property::Number(number) => number.to_string(),
+                Property::Text(text) => text.clone(),
+                Property::Time(..) | Property::Other => continue,
+            };
+            // Those of netCDF are none of TDMS.
+            if let Some(Meaning::Factor | Meaning::Offset) = meaning(name) {
+                stated.unapplied.push(format!("{name} = {value}"));
             }
+            stated.add(name, &value);
         }
         let late = match (self.start(), first) {
             (Some(own), Some(first)) => (own.0 as f64 - first.0 as f64) + (own.1 - first.1),

@@ -31,7 +31,7 @@ pub(super) fn count(properties: &Properties) -> usize {
         return 0;
     }
     match number(properties, "NI_Number_Of_Scales") {
-        Some(count) => (count as usize).min(MOST),
+        Some(count) => (count as usize).min(MOST + 1),
         None => (0..MOST)
             .rfind(|i| kind(properties, *i).is_some())
             .map_or(0, |last| last + 1),
@@ -76,7 +76,10 @@ pub(super) fn of(properties: &Properties) -> Result<Vec<Scale>, String> {
             input,
         })
     };
-    (0..count).map(scale).collect()
+    match count > MOST {
+        true => Err(format!("raw samples with more than {MOST} scales")),
+        false => (0..count).map(scale).collect(),
+    }
 }
 
 /// Replaces each sample by the value of the last scale.

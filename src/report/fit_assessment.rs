@@ -10,11 +10,11 @@ use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::identifiability::{Bands, Means};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     EquationBalance, Fit, MissingTerm, Solver, Status, equation_balance, missing_terms,
     predict_validation,
 };
+use kmcfit_core::internals::step::SimulationError;
 use std::ops::Range;
 
 /// Assessment of a fit, computed once for all its documents.

@@ -34,7 +34,6 @@ mod fit_figures;
 mod fit_quality;
 mod main_figure;
 mod model_assumptions;
-mod npy;
 mod overview;
 pub(crate) mod page;
 mod parameters;

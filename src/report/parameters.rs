@@ -2,10 +2,10 @@
 
 use super::document::{FORMAT, NoiseSummary, ResultDocument};
 use super::ratios;
-use super::run::{COVARIANCE, FittedModel};
+use super::run::FittedModel;
 use crate::error::InputError;
 use crate::text_io::{JSON, read_text_within};
-use kmcfit_core::internals::assessment::{LargeCovariance, MOST_WITH_COVARIANCE};
+use kmcfit_core::internals::assessment::LargeCovariance;
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
 use kmcfit_core::internals::identifiability::{CovarianceKind, MeanOverRecord, Means};
@@ -36,9 +36,6 @@ pub struct ParametersDocument {
     bounds: Vec<[Option<f64>; 2]>,
     /// Covariance of the estimates; `null` with more than 64 parameters and where a combination is not identifiable.
     pub covariance: Option<Vec<Vec<f64>>>,
-    /// File with the covariance of 65 to 1000 parameters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub covariance_file: Option<String>,
     /// Kind of the covariance: `information`, `penalised`, `bayesian` or `kernel`.
     pub covariance_kind: Option<CovarianceKind>,
     /// Start (s), length (s) and number of nodes of the time grid.
@@ -80,12 +77,10 @@ pub struct FunctionBasis {
     pub has_jumps: bool,
 }
 
-/// The half-width of a 95 % interval is `quantile sqrt(g^T C g + basis_error^2)` with the gradient `g` and the covariance `C`; with more than
-/// 1000 parameters neither is listed.
+/// The half-width of a 95 % interval is `quantile sqrt(g^T C g + basis_error^2)` with the gradient `g` and the covariance `C`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct EstimateError {
-    /// Derivatives of the estimate in the parameters; none with more than 1000 of them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Derivatives of the estimate in the parameters.
     gradient: Vec<f64>,
     /// Error of linear interpolation between knots.
     basis_error: f64,
@@ -186,11 +181,10 @@ impl FittedModel<'_> {
         names.extend(functions.scalars().iter().map(|s| s.name.clone()));
         units.extend(functions.scalars().iter().map(|s| s.unit.clone()));
         let covariance = bands.and_then(|bands| bands.covariance.as_ref());
-        let large = self.large_covariance();
         let kind = bands
             .filter(|_| covariance.is_some())
             .map(|bands| bands.covariance_kind);
-        let estimates = match covariance.is_some() || large.is_some() {
+        let estimates = match covariance.is_some() {
             true => self.estimate_errors(document, &names),
             false => BTreeMap::new(),
         };
@@ -203,10 +197,7 @@ impl FittedModel<'_> {
                 let row = |i: usize| c.row(i).iter().copied().collect();
                 (0..c.nrows()).map(row).collect()
             }),
-            covariance_file: large
-                .filter(|large| large.covariance.is_some())
-                .map(|_| COVARIANCE.to_owned()),
-            covariance_kind: kind.or(large.map(|large| large.kind)),
+            covariance_kind: kind,
             grid: GridSummary {
                 start: grid.start(),
                 duration: grid.duration(),
@@ -267,12 +258,8 @@ impl FittedModel<'_> {
         names: &[String],
     ) -> BTreeMap<String, EstimateError> {
         let mut errors = BTreeMap::new();
-        let is_large = names.len() > MOST_WITH_COVARIANCE;
         let error = |mean: &MeanOverRecord| EstimateError {
-            gradient: match is_large {
-                true => Vec::new(),
-                false => mean.gradient.clone(),
-            },
+            gradient: mean.gradient.clone(),
             basis_error: mean.basis_error,
             quantile: student_half_width(mean.degrees),
         };
@@ -282,9 +269,6 @@ impl FittedModel<'_> {
             if let (Some(mean), Some(_)) = (mean, estimate.ci95) {
                 errors.insert(name.clone(), error(mean));
             }
-        }
-        if is_large {
-            return errors;
         }
         for parameter in &document.nuisance_parameters {
             let index = names.iter().position(|name| *name == parameter.name);

@@ -11,7 +11,6 @@ use super::document::{
 use super::fit_assessment::RunAssessment;
 use super::fit_figures::DrawnFigures;
 use super::fit_quality;
-use super::npy::npy;
 use super::page::fit_page;
 use super::ratios;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
@@ -23,7 +22,8 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
-use kmcfit_core::internals::system::{Excitation, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::Excitation;
 use kmcfit_core::internals::threads::{analyses_at_once, map};
 use std::io;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -33,8 +33,6 @@ use std::time::{Duration, Instant};
 const PAGE: &str = "report.html";
 /// The model file, as it was read.
 pub const MODEL: &str = "model.yaml";
-/// Covariance of more than 64 parameters.
-pub(super) const COVARIANCE: &str = "covariance.npy";
 /// Most parameters of `parameters.json`: the values of more stand in `functions.csv`.
 const MOST_PARAMETERS: usize = 10_000;
 
@@ -147,9 +145,6 @@ impl FittedModel<'_> {
                 "parameters.json",
                 json(&self.parameters(document)).as_bytes(),
             )?;
-        }
-        if let Some(covariance) = self.large_covariance().and_then(|c| c.covariance.as_ref()) {
-            write(COVARIANCE, &npy(covariance))?;
         }
         write("history.csv", self.history().to_csv().as_bytes())?;
         write("functions.csv", self.functions_table().to_csv().as_bytes())?;
@@ -282,7 +277,7 @@ impl FittedModel<'_> {
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
             friction_width: problem.system.terms.iter().find_map(|t| match t {
-                Term::CoulombFriction { width } => Some(*width),
+                Law::CoulombFriction { width } => Some(*width),
                 _ => None,
             }),
             cost_kind: CostKind::of(problem, self.model.settings.solver),

@@ -12,7 +12,8 @@ use crate::results;
 use crate::text_io::{JSON, read_text, read_text_within};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::system::{Method, NodalCoefficients, System, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Method, NodalCoefficients, System};
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -67,10 +68,30 @@ impl Run {
     /// Reads the folder of a finished run.
     ///
     /// # Errors
-    /// If there is no complete run of this format in the folder: the error says which file is missing
-    /// or damaged, and where.
+    /// If there is no complete run of this format in the folder, or one of its files was edited: the error says which file is missing,
+    /// damaged or edited, and where.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self, InputError> {
         let folder = folder.as_ref();
+        let _lock = results::read_lock(folder);
+        let run = Self::open_edited(folder)?;
+        let is_read = |name: &&str| {
+            let is_shown = name.ends_with(".svg") || name.ends_with(".html");
+            !is_shown && folder.join(name).exists()
+        };
+        if let Some(name) = run.edited_files().find(is_read) {
+            let problem = "this file was changed since kmcfit wrote it";
+            return Err(InputError::file(folder.join(name), problem)
+                .expected("a run as `kmcfit fit` wrote it")
+                .hint("restore the file, or fit the edited model into another folder"));
+        }
+        Ok(run)
+    }
+
+    /// Reads the folder of a finished run whose files may have been edited.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), edited files aside.
+    pub fn open_edited(folder: &Path) -> Result<Self, InputError> {
         if !folder.is_dir() {
             return Err(InputError::file(folder, "no such folder")
                 .expected("the folder of a finished run, as written by `kmcfit fit`"));
@@ -103,6 +124,15 @@ impl Run {
             functions,
             trajectory,
         })
+    }
+
+    /// Names of the run's files that are not as they were written.
+    pub fn edited_files(&self) -> impl Iterator<Item = &str> {
+        let listed = self.value["files"].as_object().into_iter().flatten();
+        let is_edited = |(name, digest): &(&String, &Value)| {
+            digest_of_file(&self.folder.join(name)).map_or(true, |found| **digest != found)
+        };
+        listed.filter(is_edited).map(|(name, _)| name.as_str())
     }
 
     /// The files of the fit that have changed since or are missing, each with whether it is the model file, which the run holds.
@@ -219,8 +249,8 @@ fn system(
     let quantities: Option<Vec<CoefficientKind>> = model.terms.iter().map(known).collect();
     let no_terms = || unusable(format!("terms {:?}", model.terms));
     let quantities = quantities.ok_or_else(no_terms)?;
-    let terms: Vec<Term> = quantities.iter().filter_map(|q| q.term(width)).collect();
-    if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
+    let terms: Vec<Law> = quantities.iter().filter_map(|q| q.term(width)).collect();
+    if !terms.starts_with(&[Law::Damping, Law::Stiffness]) {
         return Err(no_terms());
     }
     let system = System {
@@ -233,6 +263,12 @@ fn system(
 
 fn value(folder: &Path) -> Result<Value, InputError> {
     let path = folder.join("result.json");
+    if let Some(owner) = results::owner(folder).filter(|owner| *owner != "fit") {
+        return Err(
+            InputError::file(folder, format!("these are results of `kmcfit {owner}`"))
+                .expected("the folder of a finished run, as written by `kmcfit fit`"),
+        );
+    }
     let what = "the result of a finished run";
     let text = read_text_within(&path, what, LONGEST_DOCUMENT, JSON)?;
     let value: Value = serde_json::from_str(&text).map_err(|error| {

@@ -76,6 +76,14 @@ impl OutputFolder {
         remove_leftovers(parent);
         complete(&path);
         let inputs: Vec<PathBuf> = inputs.into_iter().collect();
+        if let Some(around) = path.ancestors().skip(1).find(|at| listing(at).is_some()) {
+            return Err(InputError::argument(
+                "--out",
+                "this folder is inside results of kmcfit, which are replaced as a whole",
+            )
+            .found(around.display())
+            .expected("a folder beside them"));
+        }
         check(&path, &shown, command, &inputs, true)?;
         let mut builder = tempfile::Builder::new();
         #[cfg(unix)]
@@ -196,6 +204,21 @@ fn document_of(command: &str) -> &'static str {
     found.map_or(RESULT, |(_, document)| document)
 }
 
+/// The command whose document a folder holds.
+pub fn owner(folder: &Path) -> Option<&'static str> {
+    let found = DOCUMENTS
+        .iter()
+        .find(|(_, document)| folder.join(document).is_file());
+    found.map(|(command, _)| *command)
+}
+
+/// The files that the document of a folder lists.
+fn listing(folder: &Path) -> Option<Digests> {
+    let text = fs::read(folder.join(document_of(owner(folder)?))).ok()?;
+    let listing: Listing = serde_json::from_slice(&text).ok()?;
+    Some(listing.files)
+}
+
 /// Refuses a folder that holds anything but the files of an earlier run of the command, with `is_thorough` unchanged ones.
 fn check(
     path: &Path,
@@ -222,10 +245,7 @@ fn check(
         );
     }
     let own = document_of(command);
-    let found = DOCUMENTS
-        .iter()
-        .find(|(_, document)| path.join(document).is_file());
-    if let Some((owner, _)) = found.filter(|(_, document)| *document != own) {
+    if let Some(owner) = owner(path).filter(|owner| *owner != command) {
         return Err(InputError::argument(
             "--out",
             "this folder holds the results of another command",
@@ -235,10 +255,12 @@ fn check(
             "a new folder, or one with results of `kmcfit {command}`"
         )));
     }
-    let text = fs::read(path.join(own)).unwrap_or_default();
-    let listing = serde_json::from_slice::<Listing>(&text).ok();
+    if path.join("kmcfit-manifest.json").is_file() {
+        return Err(other("", "a run of an earlier version of kmcfit"));
+    }
+    let listing = listing(path);
     let is_run = listing.is_some();
-    let known = listing.map(|listing| listing.files).unwrap_or_default();
+    let known = listing.unwrap_or_default();
     for name in files {
         let is_document = name == own && is_run;
         match known.get(&name) {

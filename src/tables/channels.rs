@@ -10,7 +10,9 @@ use crate::error::{InputError, Location};
 use crate::formats::{self, Channel, Channels, Format, Sampling, Unusable, last_part};
 use crate::memory;
 use crate::number_format::significant;
+use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
+use crate::units::Quantity;
 
 /// Names of the column of times that is made from a sampling rate or interval; the second where a channel has the first.
 const TIME: [&str; 2] = ["time", "sampling time"];
@@ -78,20 +80,15 @@ impl Table {
         let (rows, sampling) = file.sets.get(set).copied().unwrap_or_default();
         let numbers = rows.saturating_mul(members.len() + BESIDE);
         memory::check_file(path, numbers.saturating_mul(size_of::<f64>()) as u64)?;
-        let mut table = Self {
-            path: path.to_path_buf(),
-            origin: Origin::Channels(ChannelOrigin {
-                file: Arc::clone(file),
-                set,
-                numbers: members.iter().map(|(number, _)| *number).collect(),
-            }),
-            headers: Vec::new(),
-            units: Vec::new(),
-            columns: Vec::new(),
-            lines: (1..=rows).collect(),
-            notes: file.notes.clone(),
-            first: 0,
-        };
+        let origin = Origin::Channels(ChannelOrigin {
+            file: Arc::clone(file),
+            set,
+            numbers: members.iter().map(|(number, _)| *number).collect(),
+        });
+        let mut table = Self::empty(path, origin);
+        table.lines = (1..=rows).collect();
+        table.notes.clone_from(&file.notes);
+        table.stated_step = members.iter().find_map(|(_, own)| own.stated_step);
         for (_, channel) in members {
             table.push_channel(channel);
         }
@@ -101,9 +98,8 @@ impl Table {
             table.push_channel(Channel {
                 name: (*name).to_owned(),
                 unit: Some("s".to_owned()),
-                sampling: None,
-                unapplied: Vec::new(),
                 values: (0..rows).map(|i| sampling.time(i)).collect(),
+                ..Channel::default()
             });
             if let Origin::Channels(origin) = &mut table.origin {
                 origin.numbers.push(0);
@@ -137,7 +133,8 @@ impl Table {
             }),
             samples,
             unapplied: channel.unapplied,
-            clock: None,
+            late: channel.late,
+            ..ColumnValues::default()
         });
         self.headers.push(channel.name);
         self.units.push(channel.unit.unwrap_or_default());
@@ -250,13 +247,22 @@ impl Table {
             .map_or(&[], |origin| &origin.file.unusable)
     }
 
-    /// Name by which the quantity of a column is recognised: the last part of the path in a binary file.
+    /// Name by which the quantity of a column is recognised: the last part of the path in a binary file; of three axes `x`, `y` and `z` that of
+    /// the file, as in `Gyroscope.csv`.
     pub fn quantity_name(&self, index: usize) -> &str {
         let header = self.headers().get(index).map_or("", String::as_str);
-        match self.channel_origin() {
-            Some(_) => last_part(header),
-            None => header,
+        if self.channel_origin().is_some() {
+            return last_part(header);
         }
+        let axes = ["x", "y", "z"];
+        let has = |axis: &&str| self.headers.iter().any(|name| name == *axis);
+        let file = self.path.file_stem().and_then(|stem| stem.to_str());
+        let is_motion = |file: &&str| {
+            let quantity = quantity_of(file);
+            matches!(quantity, Some(Quantity::Acceleration | Quantity::Velocity))
+        };
+        let is_axis = axes.contains(&header) && axes.iter().all(has);
+        file.filter(is_motion).filter(|_| is_axis).unwrap_or(header)
     }
 
     /// Number of a column in the file, from 1; `None` for times made from a sampling rate or interval.

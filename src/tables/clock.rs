@@ -1,5 +1,7 @@
 //! Times of day and dates in fields of text, as seconds since the first of a column.
 
+use crate::units::{Quantity, Unit};
+
 /// A time of day, with its date where it is stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Clock {
@@ -7,16 +9,32 @@ pub(super) struct Clock {
     day: Option<i64>,
     /// Seconds of the day.
     seconds: f64,
+    /// Of a date with slashes: the part that is read first.
+    pub order: Option<&'static str>,
 }
 
 /// Seconds of a day.
-const DAY: f64 = 86_400.0;
+pub(super) const DAY: f64 = 86_400.0;
+const MONTHS: [&str; 12] = [
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+];
 
 impl Clock {
-    /// Reads `23:59:58.5`, `11:59:58,5 PM`, `59:58.5`, and one of these after a date `2024-01-10`, `2024/01/10`, `10.01.2024` or
-    /// `01/10/2024`, parted by a blank or `T`; a time zone behind it is the same in all rows.
-    pub fn read(text: &str) -> Option<Self> {
+    /// Reads `23:59:58.5`, `11:59:58,5 PM`, `59:58.5`, and one of these after a date `2024-01-10`, `2024/01/10`, `10.01.2024`,
+    /// `10-Jan-2024` or `01/10/2024` or after `2 days`, parted by a blank or `T`; a time zone behind it is the same in all rows. Reads
+    /// `0.5 sec` as well.
+    pub fn read(text: &str, day_first: bool) -> Option<Self> {
         let text = text.trim_matches(['"', '\'', ' ']);
+        if let Some((number, unit)) = text.split_once(' ')
+            && let (Ok(number), Some(unit)) =
+                (number.parse::<f64>(), Unit::recognise(Quantity::Time, unit))
+        {
+            return Some(Self {
+                day: None,
+                seconds: number * unit.factor(),
+                order: None,
+            });
+        }
         let colon = text.find(':').filter(|_| text.len() < 50)?;
         let before = text[..colon]
             .char_indices()
@@ -39,9 +57,16 @@ impl Clock {
                 is_offset.then_some(None)?
             }
         };
-        let day = match date.trim_end_matches(['T', ' ', '_', ',']) {
-            "" => None,
-            date => Some(day_of(date)?),
+        let date = date.trim_end_matches(['T', ' ', '_', ',', '+']);
+        // Durations of pandas.
+        let days = date.strip_suffix("days").or(date.strip_suffix("day"));
+        let (day, order) = match (date, days) {
+            ("", _) => (None, None),
+            (_, Some(days)) => (Some(days.trim().parse().ok()?), None),
+            _ => {
+                let (day, order) = day_of(date, day_first)?;
+                (Some(day), order)
+            }
         };
         let parts: Vec<f64> = (time.replace(',', ".").split(':'))
             .map(|part| part.parse().ok().filter(|_| !part.is_empty()))
@@ -58,7 +83,11 @@ impl Clock {
         };
         let twelve = afternoon.is_some() && seconds >= 0.5 * DAY;
         let seconds = seconds + afternoon.unwrap_or(0.0) - if twelve { 0.5 * DAY } else { 0.0 };
-        Some(Self { day, seconds })
+        Some(Self {
+            day,
+            seconds,
+            order,
+        })
     }
 
     /// Seconds since the first time of a column.
@@ -80,17 +109,23 @@ impl Clock {
     }
 }
 
-/// Days since 1970-01-01 of a date: year first, else day first with points, month first with slashes unless it is above 12.
-fn day_of(date: &str) -> Option<i64> {
+/// Days since 1970-01-01 of a date, and the order of one with slashes: year first, else day first with points and lines, day or month first
+/// with slashes.
+fn day_of(date: &str, day_first: bool) -> Option<(i64, Option<&'static str>)> {
     let sign = ['-', '/', '.']
         .into_iter()
         .find(|sign| date.contains(*sign))?;
-    let parts: Option<Vec<i64>> = date.split(sign).map(|part| part.parse().ok()).collect();
+    let part = |part: &str| {
+        let month = || MONTHS.iter().position(|m| part.eq_ignore_ascii_case(m));
+        part.parse().ok().or_else(|| Some(month()? as i64 + 1))
+    };
+    let parts: Option<Vec<i64>> = date.split(sign).map(part).collect();
     let [a, b, c] = *parts? else { return None };
-    let (year, month, day) = match (a > 31, sign) {
-        (true, _) => (a, b, c),
-        (false, '/') if a <= 12 => (c, a, b),
-        (false, _) => (c, b, a),
+    let (year, month, day, order) = match (a > 31, sign) {
+        (true, _) => (a, b, c, None),
+        (false, '/') if !day_first => (c, a, b, Some("month")),
+        (false, '/') => (c, b, a, Some("day")),
+        (false, _) => (c, b, a, None),
     };
     let is_date =
         (0..10_000).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&day);
@@ -102,10 +137,8 @@ fn day_of(date: &str) -> Option<i64> {
     } else {
         (year - 1, month + 9)
     };
-    Some(
-        365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + day
-            - 719_469,
-    )
+    let leap = y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400);
+    Some((365 * y + leap + (153 * m + 2) / 5 + day - 719_469, order))
 }
 
 #[cfg(test)]
@@ -113,7 +146,7 @@ mod tests {
     use super::*;
 
     fn seconds(text: &str) -> Option<f64> {
-        let clock = Clock::read(text)?;
+        let clock = Clock::read(text, false)?;
         Some(DAY * clock.day.unwrap_or(0) as f64 + clock.seconds)
     }
 
@@ -133,6 +166,10 @@ mod tests {
             ("01.03.2024 00:00:00,5", of(19783, 0.5)),
             ("3/1/2024 00:00:00", of(19783, 0.0)),
             ("2024/02/29 12:00", of(19782, 43200.0)),
+            ("01-Mar-2024 00:00:00.5", of(19783, 0.5)),
+            ("2 days 00:00:00.002", of(2, 0.002)),
+            ("-1 days +23:59:59.5", of(-1, 86399.5)),
+            ("0.5 sec", of(0, 0.5)),
         ] {
             assert_eq!(seconds(text), expected, "{text}");
         }
@@ -158,7 +195,7 @@ mod tests {
     #[test]
     fn midnights_add_days() {
         let mut times = [0.0, 1.0, -86398.0, -86397.0];
-        Clock::read("23:59:59")
+        Clock::read("23:59:59", false)
             .expect("a time")
             .over_midnights(&mut times);
         assert_eq!(times, [0.0, 1.0, 2.0, 3.0]);

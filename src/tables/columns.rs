@@ -148,6 +148,8 @@ fn numbers(width: usize) -> String {
 
 /// Separators between a name and its unit.
 const SEPARATORS: [&str; 7] = ["/", ",", ":", ";", "|", " - ", " in "];
+/// Last words of names that state numbers of a converter.
+const COUNTS: [&str; 6] = ["lsb", "counts", "count", "adc", "digits", "codes"];
 /// First words of texts in brackets that are no units.
 pub(super) const REMARKS: &str = "left right front rear back top bottom upper lower mid middle x y z xx yy zz filtered smoothed smooth corrected \
     measured absolute relative abs rel total mean ch channel run trial test sensor node no input output";
@@ -190,9 +192,12 @@ pub(super) fn split_unit(header: &str) -> (&str, Option<&str>) {
     };
     match groups().find(|(at, text, _)| !text.is_empty() && !is_remark(*at, text)) {
         Some((at, text, end)) => (name(at, end), Some(text)),
-        None => match header.split_once(" / ") {
-            Some((name, text)) => (name.trim(), Some(text.trim())),
-            None => (header, None),
+        None => match (header.split_once(" / "), header.rsplit_once(['_', ' '])) {
+            (Some((name, text)), _) => (name.trim(), Some(text.trim())),
+            (_, Some((name, text))) if COUNTS.contains(&&*text.to_lowercase()) => {
+                (name, Some(text))
+            }
+            _ => (header, None),
         },
     }
 }

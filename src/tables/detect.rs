@@ -31,6 +31,8 @@ pub struct Layout {
     pub header: Option<usize>,
     pub units: Option<usize>,
     pub data: usize,
+    /// Order of dates with slashes.
+    pub day_first: bool,
 }
 
 /// Detects every property that `format` does not give.
@@ -55,7 +57,9 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
             1 => &mut single,
             _ => &mut best,
         };
-        if place.as_ref().is_none_or(|p| candidate.score > p.score) {
+        // Blanks part the words of a preamble.
+        let margin = if delimiter == ' ' { 1.1 } else { 1.0 };
+        if (place.as_ref()).is_none_or(|p| candidate.score > margin * p.score) {
             *place = Some(candidate);
         }
     }
@@ -75,7 +79,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
 pub(super) fn without_footer<'a>(text: &'a str, layout: &Layout) -> (&'a str, usize) {
     let is_word = |field: &str| {
         let field = field.trim().trim_matches('"');
-        field::read(field, layout.decimal) == Field::Text && Clock::read(field).is_none()
+        field::read(field, layout.decimal) == Field::Text && Clock::read(field, true).is_none()
     };
     // A row of data with a word in place of its first number is a mistake.
     let is_footer = |line: &'a str| {
@@ -175,6 +179,7 @@ fn without_numbers(
         header: header.then_some(0),
         units: units.then_some(usize::from(header)),
         data: usize::from(header) + usize::from(units),
+        day_first: false,
     }
 }
 
@@ -275,6 +280,7 @@ impl DialectCandidate {
             header,
             units,
             data,
+            day_first: false,
         })
     }
 

@@ -7,10 +7,10 @@ mod columns;
 mod detect;
 mod encoding;
 mod field;
+mod fill;
 mod format;
 mod origin;
 mod repeats;
-mod resample;
 mod rows;
 mod stated;
 mod table;
@@ -22,10 +22,7 @@ pub use columns::ColumnName;
 pub use encoding::Encoding;
 pub use format::{Detected, TableFormat};
 pub use repeats::{Duplicates, RepeatedTimes, lines_in_words, repeated_times};
-pub use resample::resample;
 pub use stated::StatedUnit;
 pub(crate) use table::TABLE;
 pub use table::Table;
-pub use times::{
-    SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at, without_rounding,
-};
+pub use times::{SAMPLE_RATES, increasing, increasing_at, without_rounding};

@@ -28,6 +28,10 @@ pub(super) struct ColumnValues {
     pub unapplied: Vec<String>,
     /// Of times of day or dates: the first.
     pub clock: Option<Clock>,
+    /// True where a date with slashes has the other order.
+    pub has_other_dates: bool,
+    /// Later than the times of the table by this fraction of a step, s.
+    pub late: f64,
 }
 
 /// The channels of a file.

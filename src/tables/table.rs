@@ -3,23 +3,21 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use csv::StringRecord;
-
-use super::clock::Clock;
+use super::clock::DAY;
 use super::detect::{Layout, detect, without_footer};
 use super::encoding::decode;
-use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
 use super::origin::{ColumnValues, Origin};
-use super::rows::{CsvText, TableRows, with_newlines};
+use super::rows::{CsvText, with_newlines};
 use super::table_memory::TableMemory;
 use crate::error::{InputError, Location};
 use crate::formats;
-use crate::text_io::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
-use kmcfit_core::internals::threads::both;
+use crate::number_format::significant;
+use crate::text_io::{LONGEST_TABLE, check_lines, read_bytes, read_bytes_from};
+use crate::units::{Quantity, Unit};
 
-/// Most columns: each takes some hundred bytes beside its fields.
-const MOST_COLUMNS: usize = 10_000;
+/// Span of dates above which day and month may be exchanged, s.
+const WEEKS: f64 = 20.0 * DAY;
 
 /// Description of a table, for messages.
 pub(crate) const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
@@ -44,6 +42,8 @@ pub struct Table {
     pub(super) notes: Vec<String>,
     /// Number of columns of the file before the first one.
     pub(super) first: usize,
+    /// Sampling interval that the file states beside the samples, s.
+    pub(super) stated_step: Option<f64>,
 }
 
 impl Table {
@@ -167,6 +167,19 @@ impl Table {
             .map_or(&[], |column| &column.unapplied)
     }
 
+    /// Sampling rate that a text states beside the samples, Hz.
+    pub fn stated_rate(&self) -> Option<f64> {
+        let step = self.stated_step.filter(|_| self.text_format().is_some())?;
+        let rate = 1.0 / step;
+        // Its printed digits, without the rounding of the division.
+        Some(significant(rate, 12).parse().unwrap_or(rate))
+    }
+
+    /// Time by which the samples of a column are later than the times of the table, s.
+    pub fn late(&self, index: usize) -> f64 {
+        self.columns.get(index).map_or(0.0, |column| column.late)
+    }
+
     /// Line in the file of each data row, from 1; of a binary file the number of the sample.
     pub fn lines(&self) -> &[usize] {
         &self.lines
@@ -263,7 +276,13 @@ impl Table {
         format: &TableFormat,
     ) -> Result<Vec<Self>, InputError> {
         format.check()?;
-        match formats::recognise(path, &bytes)? {
+        let mut found = formats::recognise(path, &bytes)?;
+        let mut bytes = bytes;
+        if let Some(unpacked) = formats::unpacked(path, &bytes, found)? {
+            found = formats::recognise(path, &unpacked)?;
+            bytes = unpacked;
+        }
+        match found {
             Some(binary) if !(binary.is_text() && format.first_given().is_some()) => {
                 Self::from_binary(path, bytes, binary, format)
             }
@@ -282,7 +301,7 @@ impl Table {
         check_lines(path, &text)?;
         let layout = detect(path, &text, format);
         let skipped = format.skip.unwrap_or(0);
-        let mut detected = Detected {
+        let detected = Detected {
             encoding,
             delimiter: layout.delimiter,
             decimal: layout.decimal,
@@ -290,24 +309,34 @@ impl Table {
             header: None,
             units_row: None,
         };
-        let mut table = Self {
-            path: path.to_path_buf(),
-            origin: Origin::Text(detected),
-            headers: Vec::new(),
-            units: Vec::new(),
-            columns: Vec::new(),
-            lines: Vec::new(),
-            notes: Vec::new(),
-            first: 0,
-        };
         let room = TableMemory::of(path, &text);
         let width = layout.width.unwrap_or(1);
         room.check(width)?;
-        table.lines = room.list(width)?;
         let (rows, footer) = without_footer(&text, &layout);
         let source = CsvText::new(rows, skipped, layout.delimiter);
-        let repeated = table.fill(&source, &layout, room, &mut detected)?;
-        table.origin = Origin::Text(detected);
+        let fill = |day_first| {
+            let (layout, mut detected) = (
+                Layout {
+                    day_first,
+                    ..layout
+                },
+                detected,
+            );
+            let mut table = Self::empty(path, Origin::Text(detected));
+            table.lines = room.list(width)?;
+            let repeated = table.fill(&source, &layout, room, &mut detected)?;
+            table.origin = Origin::Text(detected);
+            Ok::<_, InputError>((table, repeated))
+        };
+        let (mut table, mut repeated) = fill(false)?;
+        // In the other order of day and month the next day is weeks away, or before.
+        let span = table.span_of_dates();
+        if span > WEEKS
+            && let Ok(other) = fill(true)
+            && other.0.span_of_dates() < span
+        {
+            (table, repeated) = other;
+        }
         for (count, what) in [
             (footer, "of text after the rows"),
             (repeated, "that repeat the column names"),
@@ -319,252 +348,42 @@ impl Table {
         if table.headers.is_empty() && format.header.is_none() {
             table.name_by_comments(&text, layout.delimiter);
         }
+        // A row of units without names begins with that of the times.
+        let is_time = |name: &String| Unit::recognise(Quantity::Time, name).is_some();
+        let mut others = table.headers.iter().skip(1);
+        if table.units.is_empty()
+            && table.headers.first().is_some_and(is_time)
+            && others.len() > 0
+            && others.all(|name| Unit::any(name).is_some())
+        {
+            table.units.clone_from(&table.headers);
+        }
+        // The rows of the table are not examined for a rate.
+        let before = table.lines.first().map_or(0, |line| line - 1);
+        let mut lines = text.lines().take(before).peekable();
+        while let Some(line) = lines.next()
+            && table.stated_step.is_none()
+        {
+            table.stated_step = formats::step_of_line(line, lines.peek());
+        }
         table.state_clocks();
         Ok(table)
     }
 
-    fn fill(
-        &mut self,
-        source: &CsvText,
-        layout: &Layout,
-        room: TableMemory,
-        format: &mut Detected,
-    ) -> Result<usize, InputError> {
-        let mut repeated = 0;
-        let path = self.path.clone();
-        let mut rows = source.rows(&path);
-        let mut fields = StringRecord::new();
-        let mut count = 0;
-        while let Some(line) = rows.read(&mut fields)? {
-            let row = Some(count);
-            check_width(&path, line, fields.len())?;
-            if row == layout.header {
-                check_headers(&path, line, &fields, layout.decimal)?;
-                self.headers = fields.iter().map(str::to_owned).collect();
-                self.columns = columns(fields.len(), room)?;
-                format.header = Some(line);
-            } else if row == layout.units {
-                self.units = fields.iter().map(str::to_owned).collect();
-                format.units_row = Some(line);
-            } else if count >= layout.data {
-                repeated += usize::from(!self.push(line, &fields, layout, room)?);
-                // The first row of data defines the columns.
-                if let Some(later) = rows.split_off() {
-                    repeated += self.push_halves(rows, later, layout, room)?;
-                    break;
-                }
-            }
-            count += 1;
-        }
-        let first = self.lines.first().copied();
-        match (format.header.or(first), first) {
-            (None, _) => Err(empty(&path, format.skipped)),
-            (_, None) => Err(InputError::file(&path, "the file has no data")
-                .found("a row of column names only")
-                .expected(TABLE)),
-            (Some(head), _) => {
-                format.skipped = head - 1;
-                Ok(repeated)
-            }
-        }
-    }
-
-    /// Adds the rows of data of both halves of a text, which are read at the same time.
-    fn push_halves(
-        &mut self,
-        first: TableRows,
-        second: TableRows,
-        layout: &Layout,
-        room: TableMemory,
-    ) -> Result<usize, InputError> {
-        let begun = |own: &ColumnValues| ColumnValues {
-            clock: own.clock,
-            ..ColumnValues::default()
-        };
-        let mut later = Self {
-            path: self.path.clone(),
-            origin: self.origin.clone(),
-            headers: self.headers.clone(),
-            units: self.units.clone(),
-            columns: self.columns.iter().map(begun).collect(),
+    /// A table without columns.
+    pub(super) fn empty(path: &Path, origin: Origin) -> Self {
+        Self {
+            path: path.to_path_buf(),
+            origin,
+            headers: Vec::new(),
+            units: Vec::new(),
+            columns: Vec::new(),
             lines: Vec::new(),
             notes: Vec::new(),
             first: 0,
-        };
-        let (first, second) = both(
-            || self.push_all(first, layout, room),
-            || Ok((later.push_all(second, layout, room)?, later)),
-        );
-        // The first mistake in the file is reported.
-        let first = first?;
-        let (second, later): (usize, Self) = second?;
-        self.lines.extend(later.lines);
-        for (column, later) in self.columns.iter_mut().zip(later.columns) {
-            // An unreadable column has no samples after its first mistake.
-            if column.unreadable.is_none() {
-                column.samples.extend(later.samples);
-                column.unreadable = later.unreadable;
-                column.unnumbered = column.unnumbered.take().or(later.unnumbered);
-            }
-        }
-        Ok(first + second)
-    }
-
-    /// Adds all rows as data, and counts those that repeat the column names.
-    fn push_all(
-        &mut self,
-        mut rows: TableRows,
-        layout: &Layout,
-        room: TableMemory,
-    ) -> Result<usize, InputError> {
-        let mut fields = StringRecord::new();
-        let mut repeated = 0;
-        while let Some(line) = rows.read(&mut fields)? {
-            check_width(&self.path, line, fields.len())?;
-            repeated += usize::from(!self.push(line, &fields, layout, room)?);
-        }
-        Ok(repeated)
-    }
-
-    /// Adds a data row, unless it is that of the column names. A field that is not a number makes its column unusable.
-    fn push(
-        &mut self,
-        line: usize,
-        fields: &StringRecord,
-        layout: &Layout,
-        room: TableMemory,
-    ) -> Result<bool, InputError> {
-        if fields.get(0) == self.headers.first().map(String::as_str)
-            && fields == self.headers.as_slice()
-        {
-            return Ok(false);
-        }
-        let row = self.lines.len();
-        self.lines.push(line);
-        if self.columns.is_empty() {
-            let width = layout.width.unwrap_or(fields.len());
-            self.columns = columns(width, room)?;
-        }
-        // Some loggers end every row of data, but not the row of names, with a delimiter.
-        let width = self.columns.len();
-        let ended = layout.width == Some(width + 1) && fields.get(width) == Some("");
-        if fields.len() != width + usize::from(ended) {
-            let place = self.place(row, None);
-            let named = !self.headers.is_empty();
-            return Err(ragged(place, fields, width, named));
-        }
-        for (index, text) in fields.iter().take(width).enumerate() {
-            let column = &self.columns[index];
-            if column.unreadable.is_some() {
-                continue;
-            }
-            let read = field::read(text, layout.decimal);
-            if let Field::Number(value) = read {
-                self.columns[index].samples.push(value);
-                continue;
-            }
-            let is_clock = || column.clock.is_some() || column.samples.iter().all(|x| x.is_nan());
-            let clock = (read == Field::Text).then(|| Clock::read(text)).flatten();
-            if let Some(clock) = clock.filter(|_| is_clock()) {
-                let column = &mut self.columns[index];
-                let first = column.clock.get_or_insert(clock);
-                column.samples.push(clock.since(first));
-                continue;
-            }
-            let place = || self.place(row, Some(&self.label(index)));
-            let unnumbered = column
-                .unnumbered
-                .is_none()
-                .then(|| field::not_a_number(place(), text, layout.decimal));
-            let unreadable = (read != Field::Missing)
-                .then(|| field::not_a_sample(place(), text, layout.decimal));
-            let column = &mut self.columns[index];
-            column.samples.push(f64::NAN);
-            column.unnumbered = column.unnumbered.take().or(unnumbered);
-            column.unreadable = unreadable;
-        }
-        Ok(true)
-    }
-}
-
-/// Allocates the columns with capacity for all rows.
-fn columns(width: usize, room: TableMemory) -> Result<Vec<ColumnValues>, InputError> {
-    let column = |_| {
-        Ok(ColumnValues {
-            samples: room.list(width)?,
-            ..ColumnValues::default()
-        })
-    };
-    (0..width).map(column).collect()
-}
-
-/// The error for a file without rows after the skipped lines.
-fn empty(path: &Path, skipped: usize) -> InputError {
-    let error = InputError::file(path, "the file is empty").expected(TABLE);
-    match skipped {
-        0 => error,
-        lines => error.found(format!("nothing after {lines} skipped lines")),
-    }
-}
-
-/// Refuses a row with more than [`MOST_COLUMNS`] fields.
-fn check_width(path: &Path, line: usize, fields: usize) -> Result<(), InputError> {
-    if fields <= MOST_COLUMNS {
-        return Ok(());
-    }
-    Err(
-        InputError::line(path, line, 1, "the table has too many columns")
-            .found(format!("{fields} fields"))
-            .expected(format!("at most {MOST_COLUMNS}")),
-    )
-}
-
-/// Refuses repeated column names, and a row of names that are all numbers.
-fn check_headers(
-    path: &Path,
-    line: usize,
-    headers: &StringRecord,
-    decimal: char,
-) -> Result<(), InputError> {
-    let error = |problem: String| InputError::line(path, line, 1, problem);
-    let is_number = |name| matches!(field::read(name, decimal), Field::Number(_));
-    if headers.iter().all(is_number) {
-        return Err(error("the column names are missing".to_owned())
-            .found(format!("the numbers {}", quote(&listed(headers))))
-            .expected("one row of column names before the data")
-            .hint("a line that begins with `#` is a comment: remove the `#` before the names"));
-    }
-    for (index, name) in headers.iter().enumerate() {
-        let before = headers.iter().take(index).position(|other| other == name);
-        if let (Some(first), false) = (before, name.is_empty()) {
-            return Err(error(format!("two columns have the name {}", quote(name)))
-                .found(format!("columns {} and {}", first + 1, index + 1))
-                .expected("every column name once"));
+            stated_step: None,
         }
     }
-    Ok(())
-}
-
-/// The error for a row with more or fewer fields than there are columns.
-fn ragged(place: Location, fields: &StringRecord, expected: usize, named: bool) -> InputError {
-    let plural = |n: usize| match n {
-        1 => "1 field".to_owned(),
-        n => format!("{n} fields"),
-    };
-    let problem = match named {
-        true => "the row does not fit the column names",
-        false => "the row does not fit the other rows",
-    };
-    let error = InputError::new(place, problem)
-        .found(plural(fields.len()))
-        .expected(format!("{}, one per column", plural(expected)));
-    if fields.iter().any(|field| field.contains('\n')) {
-        return error.hint("a quote that is opened in this row is not closed in it");
-    }
-    if fields.len() == 2 * expected {
-        return error.hint("write numbers with a decimal point, not a comma");
-    }
-    error
 }
 
 /// True for the text of a model file: a line that begins with each of its first keys.

@@ -1,4 +1,4 @@
-//! Upper estimate of the memory of a table, checked against the available memory before allocation.
+//! Upper estimate of the memory of a table, checked against the bound on memory before allocation.
 
 use crate::error::InputError;
 use crate::memory;

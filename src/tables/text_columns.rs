@@ -2,6 +2,7 @@
 
 use super::Table;
 use super::origin::ColumnValues;
+use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
 use crate::units::{Quantity, Unit};
@@ -14,6 +15,8 @@ const SINCE_1970: [(f64, &str); 3] = [(1e11, "ms"), (1e14, "µs"), (1e17, "ns")]
 /// Serial days of spreadsheets, of the years from 1982 to 2119, and the spacing (s) below which these are no seconds.
 const SERIAL_DAYS: std::ops::Range<f64> = 3e4..8e4;
 const DENSE: f64 = 1e-4;
+/// Relative difference below which two rates are the same.
+const SAME_RATE: f64 = 0.02;
 /// Names of times that state their unit.
 const NAMED: [(&str, &str); 3] = [("millis", "ms"), ("micros", "µs"), ("nanos", "ns")];
 
@@ -57,6 +60,21 @@ impl Table {
         }
     }
 
+    /// Longest span of dates with slashes, s; infinite where they decrease or have the other order.
+    pub(super) fn span_of_dates(&self) -> f64 {
+        let span = |column: &ColumnValues| {
+            let samples = &column.samples;
+            let is_back = || samples.windows(2).any(|pair| pair[1] < pair[0]);
+            match column.clock.filter(|clock| clock.order.is_some()) {
+                _ if column.has_other_dates => f64::INFINITY,
+                Some(_) if is_back() => f64::INFINITY,
+                Some(_) => samples.last().unwrap_or(&0.0) - samples[0],
+                None => 0.0,
+            }
+        };
+        self.columns.iter().map(span).fold(0.0, f64::max)
+    }
+
     /// States the units of times that follow from their form or magnitude, and where these follow from.
     pub(super) fn state_clocks(&mut self) {
         for index in 0..self.width() {
@@ -66,9 +84,11 @@ impl Table {
             if let Some(clock) = column.clock.filter(|_| column.unreadable.is_none()) {
                 clock.over_midnights(&mut column.samples);
                 self.state_unit(index, "s");
+                let order = clock.order.map(|order| format!(", {order} first"));
                 self.notes.push(format!(
-                    "the times of day in {} are read as seconds since the first",
-                    quote(&self.label(index))
+                    "the times of day in {} are read as seconds since the first{}",
+                    quote(&self.label(index)),
+                    order.unwrap_or_default()
                 ));
             } else if let Some(unit) = self.unit_of_magnitude(index) {
                 self.state_unit(index, unit);
@@ -77,6 +97,51 @@ impl Table {
                     quote(&self.label(index))
                 ));
             }
+            self.compare_rates(index);
+        }
+        if let Some(rate) = self.stated_rate()
+            && !(0..self.width()).any(|index| self.unit_of_times(index).is_some())
+        {
+            let rate = significant(rate, 6);
+            self.notes
+                .push(format!("sampling rate of the header: {rate} Hz"));
+        }
+    }
+
+    /// The unit of times that a column states; of a name of times also that at its end, else that of SI.
+    pub(crate) fn unit_of_times(&self, index: usize) -> Option<Unit> {
+        let (stated, kind) = (self.stated_unit(index), Quantity::Time);
+        stated.explicit(kind).or_else(|| {
+            let is_named = quantity_of(self.quantity_name(index)) == Some(kind);
+            (is_named && stated.text().is_none()).then_some(())?;
+            let end = stated.suffix(kind).or(stated.last_word(kind));
+            Some(end.unwrap_or(Unit::si(kind)))
+        })
+    }
+
+    /// States a sampling rate beside the samples that the times in a column contradict.
+    fn compare_rates(&mut self, index: usize) {
+        let (Some(step), Some(unit)) = (self.stated_step, self.unit_of_times(index)) else {
+            return;
+        };
+        let Some(column) = self.columns.get_mut(index) else {
+            return;
+        };
+        let times: Vec<f64> = (column.samples.iter().copied())
+            .filter(|t| t.is_finite())
+            .collect();
+        let (&[first, .., last], None) = (&*times, &column.unreadable) else {
+            return;
+        };
+        let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        // The mean does not change by rounding, the median not by gaps.
+        let mean = (last - first) / spacings.len() as f64;
+        let found = [mean, median(&*spacings)].map(|spacing| spacing * unit.factor());
+        if found.iter().all(|own| (own / step - 1.0).abs() > SAME_RATE) {
+            let [stated, own] = [step, found[0]].map(|step| significant(1.0 / step, 6));
+            column.unapplied.push(format!(
+                "a sampling rate of {stated} Hz (by its times: {own} Hz)"
+            ));
         }
     }
 
@@ -113,11 +178,7 @@ impl Table {
 
     /// The runs of a table that stand side by side, each with its own times in its first column; else the table.
     pub(super) fn runs(self) -> Vec<Self> {
-        let is_time = |i: &usize| {
-            let explicit = self.stated_unit(*i).explicit(Quantity::Time).is_some();
-            explicit
-                || self.unit(*i).is_none() && quantity_of(&self.headers[*i]) == Some(Quantity::Time)
-        };
+        let is_time = |i: &usize| self.unit_of_times(*i).is_some();
         let mut begins: Vec<usize> = (0..self.headers.len()).filter(is_time).collect();
         let is_same = |i: &usize| {
             let samples = |i: usize| self.columns[i].samples.iter().map(|x| x.to_bits());
@@ -165,6 +226,7 @@ impl Table {
             path: self.path.clone(),
             origin: self.origin.clone(),
             notes: self.notes.clone(),
+            stated_step: self.stated_step,
         }
     }
 }

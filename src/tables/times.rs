@@ -1,24 +1,20 @@
-//! Checks of the times of a table: strictly increasing, and equally spaced where required.
+//! Times of a table: strictly increasing ones, and equally spaced ones without their rounding.
 
 use super::Table;
 use crate::error::InputError;
-use kmcfit_core::internals::signal::median;
 
 /// Largest deviation of a spacing from the step, and of a time from `t_0 + i dt`, relative to the step.
 ///
 /// Times computed as i·dt in double precision deviate from equal spacing by some 1e-16 T, below 1e-10 of a step for up
 /// to a million samples. The tolerance accepts times printed with nine or more digits, and its effect on a sample is
 /// negligible.
-pub const SPACING_TOLERANCE: f64 = 1e-6;
+const SPACING_TOLERANCE: f64 = 1e-6;
 
 /// Sampling rates that are accepted, Hz.
 ///
 /// From one sample in 30,000 years to one in a picosecond, so that times, their squares and their reciprocals stay far
 /// from overflow and underflow.
 pub const SAMPLE_RATES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
-
-/// Deviation of a spacing, relative to the step, below which it counts as a rounding error.
-const ROUNDED: f64 = 0.05;
 
 /// The times in a column, strictly increasing.
 ///
@@ -99,85 +95,6 @@ pub fn without_rounding(times: &[f64]) -> Option<ExactTimes> {
     })
 }
 
-/// The step dt, in the unit of the column, of times t_i = t_0 + i dt.
-///
-/// The step is the mean spacing, (t_last - t_0)/(rows - 1). Spacings are compared with their median, so that a single
-/// gap is reported at its row.
-///
-/// # Errors
-///
-/// When the times are not [`increasing`], there is only one, a spacing differs from the median by
-/// more than [`SPACING_TOLERANCE`], or a time is further than that from `t_0 + i dt`.
-pub fn equally_spaced(table: &Table, column: &str) -> Result<f64, InputError> {
-    equally_spaced_at(table, table.find(&column.into())?)
-}
-
-/// As [`equally_spaced`], of a column by its index from 0.
-///
-/// # Errors
-///
-/// As [`equally_spaced`].
-pub fn equally_spaced_at(table: &Table, index: usize) -> Result<f64, InputError> {
-    let times = increasing_at(table, index)?;
-    let column = &*table.label(index);
-    let (&[first, .., last], intervals) = (times, times.len().saturating_sub(1)) else {
-        return Err(
-            InputError::new(table.place(0, Some(column)), "a single row of data")
-                .found("1 row")
-                .expected("at least 2 rows"),
-        );
-    };
-    let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let expected = median(&*spacings);
-    let off = |spacing: &f64| (spacing - expected).abs() > SPACING_TOLERANCE * expected;
-    match spacings.iter().position(off) {
-        None => in_place(table, column, times, (last - first) / intervals as f64),
-        Some(row) => {
-            let error = InputError::new(
-                table.place(row + 1, Some(column)),
-                "the times are not equally spaced",
-            )
-            .found(format!(
-                "{} after {}, a spacing of {}",
-                times[row + 1],
-                times[row],
-                spacing(spacings[row])
-            ))
-            .expected(format!(
-                "a spacing of {}, as between most rows",
-                spacing(expected)
-            ));
-            Err(
-                match (spacings[row] - expected).abs() < ROUNDED * expected {
-                    true => {
-                        error.hint("the times may have been rounded: print more digits of them")
-                    }
-                    false => error,
-                },
-            )
-        }
-    }
-}
-
-/// The step, if every time agrees with `t_0 + i dt`: small deviations of the spacing must not add up.
-fn in_place(table: &Table, column: &str, times: &[f64], step: f64) -> Result<f64, InputError> {
-    let place = |i: usize| times[0] + i as f64 * step;
-    let astray = |i: &usize| (times[*i] - place(*i)).abs() > SPACING_TOLERANCE * step;
-    match (0..times.len()).find(astray) {
-        None => Ok(step),
-        Some(i) => Err(InputError::new(
-            table.place(i, Some(column)),
-            "the times are not equally spaced: they drift",
-        )
-        .found(times[i])
-        .expected(format!(
-            "{}, {i} steps of {} after the first",
-            place(i),
-            spacing(step)
-        ))),
-    }
-}
-
 pub(super) fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> InputError {
     let (before, here) = (times[row - 1], times[row]);
     let problem = match before == here {
@@ -188,11 +105,6 @@ pub(super) fn not_increasing(table: &Table, column: &str, times: &[f64], row: us
     InputError::new(table.place(row, Some(column)), problem)
         .found(format!("{here} after {before} in {row_before}"))
         .expected(format!("a time greater than {before}"))
-}
-
-/// A spacing without the last digits, which are rounding errors of the difference.
-fn spacing(value: f64) -> f64 {
-    format!("{value:.9e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]

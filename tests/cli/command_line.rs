@@ -270,6 +270,7 @@ fn init_prints_the_properties_of_the_record() {
     error: only.csv: no column of times
       found: no column whose numbers increase from row to row
       expected: a column of times, `--time COLUMN`, or `--sample-rate HZ`
+      hint: if another file has the times, write one table of both: `paste -d, TIMES.csv RECORD.csv > both.csv`
     ");
     assert_snapshot!(bench.run(&["init", "only.csv", "--sample-rate", "0"]).2, @"
     error: --sample-rate: invalid sampling rate

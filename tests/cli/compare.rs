@@ -296,3 +296,16 @@ functions:
         "{document}"
     );
 }
+
+/// Runs of another content of the same file are not ranked, whatever the kind of their samples.
+#[test]
+fn a_file_that_changed_is_another_record() {
+    let bench = bench();
+    bench.run_to(0, &["fit", "constants.yaml", "--out", "before"]);
+    let samples = bench.read("samples.csv");
+    let ranked = bench.run_to(0, &["compare", "before", "twice.yaml"]);
+    assert!(ranked.contains("The data favour"), "{ranked}");
+    bench.write("samples.csv", &format!("# measured again\n{samples}"));
+    let (_, stdout, stderr) = bench.run(&["compare", "before", "twice.yaml"]);
+    assert!(stdout.contains("different records"), "{stdout}{stderr}");
+}

@@ -256,6 +256,14 @@ fn the_footbridge_is_monitored() {
     );
 }
 
+/// A fleet none of whose records can be fitted has its rows, and another exit code.
+#[test]
+fn a_fleet_without_a_result_is_no_success() {
+    let bench = bench(1);
+    let out = bench.run_to(3, &["fleet", "model.yaml", "absent.csv", "--out", "fleet"]);
+    assert!(out.contains("1 error"), "{out}");
+}
+
 #[test]
 fn wrong_arguments() {
     let bench = bench(2);

@@ -115,7 +115,7 @@ fn advice_that_was_tried_improves_the_fit() {
             .file_stem()
             .and_then(|name| name.to_str())
             .unwrap_or_default();
-        !["paper-device", "paper-experiments", "paper-sequence"].contains(&name)
+        !["paper-device", "paper-experiments"].contains(&name)
     });
     let rigs = std::env::var("KMCFIT_RIGS").expect("KMCFIT_RIGS names a folder");
     all.extend(files(Path::new(&rigs), &["csv", "txt"]));

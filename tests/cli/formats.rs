@@ -279,9 +279,8 @@ fn refused_files() {
     ");
     with_bytes(&bench, "a.csv", b"\x1f\x8b\x08\0");
     assert_snapshot!(refused(&bench, &["check", "a.csv"]), @"
-    error: a.csv: this is a file compressed by gzip, which is not read
-      expected: a text table, or a file of NumPy, MATLAB, HDF5, LabVIEW (TDMS), WAV or UFF
-      hint: decompress it: `gunzip FILE`
+    error: a.csv: the file cannot be read: unexpected end of file
+      hint: unpack the file, and name the table in it
     ");
     with_bytes(&bench, "a.npy", b"t,y\n0,1\n");
     assert_snapshot!(refused(&bench, &["check", "a.npy"]), @"

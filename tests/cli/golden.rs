@@ -167,7 +167,7 @@ fn a_change_beyond_the_margins_is_found() {
 
 #[test]
 fn shipped_models() {
-    const WITHOUT_FIT: [&str; 3] = ["paper-device", "paper-experiments", "paper-sequence"];
+    const WITHOUT_FIT: [&str; 2] = ["paper-device", "paper-experiments"];
     let mut models = models("models");
     models.retain(|(name, _)| !WITHOUT_FIT.contains(&name.as_str()));
     compare("models", &fitted(&models, &repository("data")));

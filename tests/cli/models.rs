@@ -81,7 +81,6 @@ fn every_shipped_model_is_run_here() {
         "paper-experiments.yaml",
         "paper-two-records.yaml",
         "paper-forced.yaml",
-        "paper-sequence.yaml",
         "accelerometer.yaml",
         "hammer-and-shaker.yaml",
         "duffing.yaml",
@@ -93,12 +92,8 @@ fn every_shipped_model_is_run_here() {
         "camera.yaml",
     ];
     assert_eq!(found, run_here.map(str::to_owned).into());
-    // All except models for simulation, and the sequence of other models.
-    let without_fit = [
-        "paper-device.yaml",
-        "paper-experiments.yaml",
-        "paper-sequence.yaml",
-    ];
+    // All except models for simulation.
+    let without_fit = ["paper-device.yaml", "paper-experiments.yaml"];
     for file in run_here.iter().filter(|file| !without_fit.contains(file)) {
         let name = file.strip_suffix(".yaml").expect("YAML");
         let pinned = format!("tests/cli/work/{name}.txt");

@@ -179,6 +179,7 @@ fn gaps_of_a_force_are_left_out_by_a_window() {
         } else {
             force(t)
         };
+        // Noise far above the error of the steps, 7e-6 of the frequency.
         text += &format!(
             "{t:.4},{known:.9},{:.9}\n",
             acceleration(t, x, v) + 0.2 * noise
@@ -337,13 +338,29 @@ fn samples_that_stand_twice_are_named() {
             "{message}"
         );
     }
+    // The response in g beside itself in m/s^2.
+    let copied = std::fs::read_to_string(repository("data/shaker.csv")).expect("a record");
+    let rows = copied.lines().skip(1).filter_map(|line| {
+        let a: f64 = line.split(',').nth(2)?.parse().ok()?;
+        Some(format!(
+            "{},{:.9},{a}\n",
+            line.split(',').next()?,
+            a / 9.80665
+        ))
+    });
+    let rows: String = rows.collect();
+    bench.write("c.csv", &format!("t_s,f_N,a_m_per_s2\n{rows}"));
+    bench.write("model.yaml", &model(&record("c.csv", "f_N")));
+    let (code, _, message) = bench.run(&["fit", "model.yaml"]);
+    assert_eq!(code, 2);
+    assert!(message.contains("are the same column"), "{message}");
     let twice = record("a.csv", "f_N") + &record("b.csv", "f_N");
     bench.write("model.yaml", &model(&twice));
     let document = fit(&bench, &["model.yaml"]);
     assert!(reasons(&document).contains(&"repeated_record"));
 }
 
-/// Displacements of base and response, both to the ground: the advice names `absolute`, and following it is adequate.
+/// Displacements of base and response, both to the ground: `init` writes `absolute: true`; without it the advice names it.
 #[test]
 fn absolute_motion_is_advised_and_right() {
     let bench = Workbench::empty();
@@ -371,14 +388,14 @@ fn absolute_motion_is_advised_and_right() {
     }
     bench.write("table.csv", &text);
     bench.run_to(0, &["init", "table.csv", "--base", "ground_m"]);
-    let document = fit(&bench, &["table.yaml"]);
     let key = "experiments.0.sensors.displacement.absolute=true";
-    let first = advice(&document);
+    let relative = key.replace("true", "false");
+    let first = advice(&fit(&bench, &["table.yaml", "--set", &relative]));
     assert!(
         first.lines().next().is_some_and(|line| line.contains(key)),
         "{first}"
     );
-    let document = fit(&bench, &["table.yaml", "--set", key]);
+    let document = fit(&bench, &["table.yaml"]);
     assert!(holds(&document, "natural_frequency", 3.0));
     assert!(holds(&document, "damping_ratio", 0.03));
 }

@@ -105,6 +105,13 @@ fn the_results_of_another_command_are_refused() {
     assert!(refused(&bench, &into_fleet, "--out").contains("results of `kmcfit fleet`"));
     let into_run = ["fleet", "model.yaml", "samples.csv", "--out", "run"];
     assert_eq!(bench.run(&into_run).0, 2);
+    // Nor does one write into the folder of another, which would no longer be replaced.
+    let inside = ["fit", "model.yaml", "--out", "run/mine"];
+    assert!(refused(&bench, &inside, "--out").contains("inside results of kmcfit"));
+    for command in [&["study", "fleet"][..], &["verify", "fleet"]] {
+        let stderr = refused(&bench, command, "fleet");
+        assert!(stderr.contains("results of `kmcfit fleet`"), "{stderr}");
+    }
 }
 
 #[test]
@@ -360,6 +367,22 @@ fn a_run_knows_what_it_read() {
     assert!(stderr.contains("missing"), "{stderr}");
     bench.write("samples.csv", &samples);
     bench.run_to(0, &["verify", "run"]);
+    // Commands that read the files of a run refuse edited ones; `verify` names them.
+    for name in ["model.yaml", "functions.csv"] {
+        let path = format!("run/{name}");
+        let text = bench.read(&path);
+        bench.write(&path, &format!("{}9\n", text.trim_end()));
+        for command in [
+            &["study", "run"][..],
+            &["predict", "run", "--initial", "1,0"],
+            &["compare", "run", "model.yaml"],
+        ] {
+            let stderr = refused(&bench, command, &path);
+            assert!(stderr.contains("changed since kmcfit wrote it"), "{stderr}");
+            assert!(stderr.contains("into another folder"), "{stderr}");
+        }
+        bench.write(&path, &text);
+    }
 }
 
 /// Edits by 1e-6 of any number are found.
@@ -421,4 +444,54 @@ fn what_was_removed_is_named() {
     bench.write("run/result.json", &format!("{}\n}}\n", &text[..files]));
     let stderr = refused(&bench, &["verify", "run"], "run/result.json");
     assert!(stderr.contains("fit the model again"), "{stderr}");
+    bench.write("run/kmcfit-manifest.json", "{}");
+    let stderr = refused(&bench, &FIT, "run/");
+    assert!(stderr.contains("of an earlier version"), "{stderr}");
+    bench.write("fleet/fleet.json", "{\"version\": \"0.1.0\"}");
+    let fleet = ["fleet", "model.yaml", "samples.csv", "--out", "fleet"];
+    let stderr = refused(&bench, &fleet, "fleet/fleet.json");
+    assert!(stderr.contains("of an earlier version"), "{stderr}");
+    // Keys and choices, also those of one experiment.
+    let own = "    functions: {mass: {basis: nodal, start: 2.0, penalty: {kind: tikhonov, weight: gcv}}}\ngrid:";
+    for (key, model) in [
+        ("sequence", "format: 1\nsequence: [model.yaml]\n".to_owned()),
+        (
+            "smooth",
+            MODEL.replace("start: 2.0", "start: 2.0, smooth: {order: 2}"),
+        ),
+        ("gcv", MODEL.replace("grid:", own)),
+        (
+            "auto",
+            MODEL.replace(
+                "functions:",
+                "functions:\n  coulomb_friction: {basis: constant, start: 1.0, width: auto}",
+            ),
+        ),
+    ] {
+        bench.write("old.yaml", &model);
+        let (code, _, stderr) = bench.run(&["fit", "old.yaml"]);
+        assert_eq!(code, 2, "{stderr}");
+        assert!(
+            stderr.contains("was removed") && stderr.contains(key),
+            "{stderr}"
+        );
+    }
+    for name in ["study.bootstrap", "gcv"] {
+        let (_, _, stderr) = bench.run(&["explain", name]);
+        assert!(stderr.contains("was removed\n"), "{stderr}");
+    }
+}
+
+/// The model of a record stands in no file: its errors name the record.
+#[test]
+fn errors_of_the_model_of_a_record_name_the_record() {
+    let bench = Workbench::with_small_model();
+    let (code, _, stderr) =
+        bench.run(&["fit", "samples.csv", "--set", "functions.stiffness.fixed=3"]);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(
+        stderr.contains("error: samples.csv: functions.stiffness"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("`kmcfit init samples.csv`"), "{stderr}");
 }

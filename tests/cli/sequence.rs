@@ -1,4 +1,4 @@
-//! The sequence of the README in one command: neither the paper's fit nor positivity alone recovers the true system; the
+//! Models of the paper's record compared: neither the paper's fit nor positivity alone recovers the true system; the
 //! assumptions of the later models do.
 
 use crate::workbench::Workbench;
@@ -83,22 +83,4 @@ fn a_sequence_states_which_assumptions_recover_the_system() {
             .iter()
             .all(|name| elsewhere(name) < 1e-9)
     );
-}
-
-/// The key `sequence` is found in every style of YAML.
-#[test]
-fn a_sequence_in_flow_style() {
-    let bench = Workbench::with_shipped_models();
-    for text in [
-        "{format: 1, title: T, sequence: [nowhere.yaml]}\n",
-        "{\"format\": 1, \"sequence\": [\"nowhere.yaml\"]}\n",
-        "format: 1\n'sequence': [nowhere.yaml]\n",
-        "format: 1\n? sequence\n: [nowhere.yaml]\n",
-    ] {
-        bench.write("models/flow.yaml", text);
-        let (code, _, said) = bench.run(&["study", "models/flow.yaml"]);
-        assert_eq!(code, 2, "{said}");
-        let read = "models/nowhere.yaml: no such file";
-        assert!(said.contains(read), "{text}: {said}");
-    }
 }

@@ -1,4 +1,4 @@
-//! `kmcfit study`: analyses of a fit, and sequences.
+//! `kmcfit study`: analyses of a fit.
 
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
@@ -177,7 +177,7 @@ fn a_study_of_a_run_is_that_of_its_model() {
     assert_eq!(code, 2);
     assert_snapshot!(stderr, @"
     error: runn: no such file
-      expected: a model file or a sequence (YAML), or the folder of a finished run
+      expected: a model file (YAML)
       hint: did you mean `run`?
     ");
 }

@@ -198,20 +198,10 @@ fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
             ("commas", format!("t_s,mass_kg{}", repeat(",", 1_000_000))),
             ("rows", format!("iteration\n{}", repeat("\n", 500_000))),
         ],
-        "study_journal" => vec![
-            (
-                "lists",
-                format!(
-                    "{{\"piece\":\"a\",\"result\":[{}0]}}\n",
-                    repeat("[],", 200_000)
-                ),
-            ),
-            ("lines", repeat("{\"piece\":\"a\",\"result\":0}\n", 20_000)),
-        ],
-        "yaml" | "override" | "sequence" => vec![(
+        "yaml" | "override" => vec![(
             "aliases of a long list",
             format!(
-                "title=\nsequence: &a [{}]\nb: [{}]\n",
+                "title=\nlist: &a [{}]\nb: [{}]\n",
                 repeat("1,", 20_000),
                 repeat("*a,", 900)
             ),

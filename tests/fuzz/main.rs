@@ -111,11 +111,6 @@ fn overrides() {
 }
 
 #[test]
-fn sequences_of_models() {
-    hold("sequences_of_models", 5);
-}
-
-#[test]
 fn binary_files() {
-    hold("binary_files", 6);
+    hold("binary_files", 5);
 }

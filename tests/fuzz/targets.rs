@@ -3,7 +3,7 @@
 
 use kmcfit::Run;
 use kmcfit::config::values::{Count, Nodes};
-use kmcfit::config::{BuildMode, ModelFile, Override, Sequence, build};
+use kmcfit::config::{BuildMode, ModelFile, Override, build};
 use kmcfit::error::InputError;
 use kmcfit::fitting::fit_model;
 use kmcfit::formats::{self, recognise};
@@ -32,13 +32,12 @@ pub enum Verdict {
 pub static KINDS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// All targets, by the names of their folders in the corpus.
-pub const TARGETS: [(&str, Target); 7] = [
+pub const TARGETS: [(&str, Target); 6] = [
     ("model", model),
     ("table", table),
     ("run", run),
     ("yaml", yaml),
     ("override", overrides),
-    ("sequence", sequence),
     ("channels", channels),
 ];
 
@@ -188,16 +187,6 @@ pub fn overrides(bytes: &[u8]) -> Verdict {
     }
 }
 
-/// A sequence of models.
-pub fn sequence(bytes: &[u8]) -> Verdict {
-    let path = workshop().path("models/sequence.yaml");
-    fs::write(&path, bytes).expect("room");
-    match Sequence::read(&path) {
-        Err(error) => told(&error),
-        Ok(_) => Verdict::Accepted,
-    }
-}
-
 /// A model file: parsed, built in every mode, and evaluated once.
 pub fn model(bytes: &[u8]) -> Verdict {
     let place = workshop().path("models/m.yaml");
@@ -278,7 +267,7 @@ fn columns(table: &Table) {
         }
     }
     for name in table.headers().iter().take(20) {
-        if let Err(error) = times::equally_spaced(table, name) {
+        if let Err(error) = times::increasing(table, name) {
             told(&error);
         }
     }

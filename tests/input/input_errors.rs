@@ -112,11 +112,6 @@ fn records_without_what_errors_of_an_input_need() {
       found: no samples of the force
       expected: `columns: {force: …}`, or no sigma of it
     ");
-    assert_snapshot!(changed("validation: false", "force: {interpolation: cubic}"), @"
-    m.yaml:5:44: experiments[0].sigma.force: errors of an input need an input that is linear between its samples
-      found: another interpolation
-      expected: `interpolation: linear`, or no sigma of the input
-    ");
     let two = FORCED
         .replace("y_m, force", "y_m, velocity: v_m_per_s, force")
         .replace("sigma: {", "sigma: {velocity: 0.1, ");

@@ -82,12 +82,6 @@ impl Pages {
         );
         pages.write("hostile.yaml", &hostile);
         pages.write(&format!("{HOSTILE_STEM}.yaml"), &hostile);
-        let sequence = format!(
-            "format: 1\ntitle: {}\nsequence: [plain.yaml, {}]\n",
-            quoted(HOSTILE),
-            quoted(&format!("{HOSTILE_STEM}.yaml"))
-        );
-        pages.write("sequence.yaml", &sequence);
         let noise = ["--noise", "0.02", "--seed", "5", "--out", "samples.csv"];
         pages.run(&[&["simulate", "device.yaml"][..], &noise].concat());
         let samples = pages.read("samples.csv");
@@ -101,7 +95,8 @@ impl Pages {
         pages.run(&["fit", "hostile.yaml"]);
         pages.run(&["compare", "runs/plain", "runs/hostile"]);
         pages.run(&["study", "hostile.yaml", "--out", "runs/study"]);
-        pages.run(&["study", "sequence.yaml", "--out", "runs/sequence"]);
+        let hostile = format!("{HOSTILE_STEM}.yaml");
+        pages.run(&["compare", "plain.yaml", &hostile, "--out", "runs/models"]);
         pages
     }
 
@@ -133,7 +128,7 @@ pub const PAGES: [&str; 5] = [
     "runs/hostile/report.html",
     "runs/compare/compare.html",
     "runs/study/study.html",
-    "runs/sequence/compare.html",
+    "runs/models/compare.html",
 ];
 
 pub fn pages() -> &'static Pages {

@@ -239,11 +239,11 @@ fn hostile_texts_are_texts() {
         let page = parsed(&html);
         let text = text_of(page.root_element());
         assert!(
-            text.contains(HOSTILE) || name.contains("/compare/"),
+            text.contains(HOSTILE) || name.contains("compare.html"),
             "{name}"
         );
         let file = match *name {
-            "runs/sequence/compare.html" => HOSTILE_STEM,
+            "runs/models/compare.html" => HOSTILE_STEM,
             "runs/compare/compare.html" => "hostile",
             _ => "<i>&'data.csv",
         };

@@ -124,12 +124,69 @@ fn headings() {
     }
 }
 
-/// Attributes of samples in HDF5: units, scales, rates and starts of any name are applied, other scales are named.
+/// Value of a property of TDMS.
+#[derive(Clone)]
+pub enum Property {
+    Number(f64),
+    Text(&'static str),
+    /// Whole seconds and fractions of 2^-64.
+    Time(i64, u64),
+}
+
+/// Path, properties and samples.
+pub type TdmsObject<'a> = (&'a str, &'a [(&'a str, Property)], &'a [f64]);
+
+/// A file of TDMS with a segment: objects by their paths, each with properties and samples.
+pub fn tdms(objects: &[TdmsObject]) -> Vec<u8> {
+    let text = |bytes: &mut Vec<u8>, text: &str| {
+        bytes.extend((text.len() as u32).to_le_bytes());
+        bytes.extend(text.bytes());
+    };
+    let mut meta = (objects.len() as u32).to_le_bytes().to_vec();
+    for (path, properties, samples) in objects {
+        text(&mut meta, path);
+        match samples {
+            [] => meta.extend(u32::MAX.to_le_bytes()),
+            samples => {
+                meta.extend([20u32, 10, 1].map(u32::to_le_bytes).concat());
+                meta.extend((samples.len() as u64).to_le_bytes());
+            }
+        }
+        meta.extend((properties.len() as u32).to_le_bytes());
+        for (name, value) in *properties {
+            text(&mut meta, name);
+            match value {
+                Property::Number(x) => {
+                    meta.extend(10u32.to_le_bytes());
+                    meta.extend(x.to_le_bytes());
+                }
+                Property::Text(own) => {
+                    meta.extend(0x20u32.to_le_bytes());
+                    text(&mut meta, own);
+                }
+                Property::Time(seconds, fraction) => {
+                    meta.extend(0x44u32.to_le_bytes());
+                    meta.extend(fraction.to_le_bytes());
+                    meta.extend(seconds.to_le_bytes());
+                }
+            }
+        }
+    }
+    let samples = objects.iter().flat_map(|(.., samples)| samples.iter());
+    let raw: Vec<u8> = samples.flat_map(|x| x.to_le_bytes()).collect();
+    let mut bytes = b"TDSm".to_vec();
+    bytes.extend([14u32, 4713].map(u32::to_le_bytes).concat());
+    bytes.extend(((meta.len() + raw.len()) as u64).to_le_bytes());
+    bytes.extend((meta.len() as u64).to_le_bytes());
+    [bytes, meta, raw].concat()
+}
+
+/// Attributes of samples in HDF5 and properties in TDMS: units, scales, rates and starts of any name are applied, other scales are named.
 #[test]
 fn attributes() {
     let samples = [1.0, -2.0, 4.0, 8.0, 3.0];
     let mut random = ChaCha8Rng::seed_from_u64(71);
-    for i in 0..5 * COUNT {
+    for i in 0..10 * COUNT {
         let value = f64::from(random.random_range(2..2000)) / 8.0;
         let (names, kind): (&[&str], &str) = match i % 5 {
             0 => (
@@ -186,28 +243,46 @@ fn attributes() {
             AttrValue::I64(whole) => whole as f64,
             _ => value,
         };
-        let mut file = FileBuilder::new();
         let is_outside = kind == "rate" && random.random_bool(0.3);
-        if is_outside {
-            file.set_attr(name, attribute.clone());
-        }
-        let set = file
-            .create_dataset("force")
-            .with_f64_data(&samples)
-            .with_shape(&[5]);
-        if !is_outside {
-            set.set_attr(name, attribute);
-        }
-        let bytes = file.finish().expect("a file");
-        let tables = Table::parse_all("f.h5", &*bytes, &TableFormat::default())
+        let is_tdms = random.random_bool(0.5);
+        let bytes = if is_tdms {
+            let property = match kind {
+                "unit" => Property::Text("kN"),
+                _ => Property::Number(value),
+            };
+            let both = [&[][..], &[(name, property)]];
+            let place = usize::from(is_outside);
+            tdms(&[
+                ("/'g'", both[place], &[]),
+                ("/'g'/'force'", both[1 - place], &samples),
+            ])
+        } else {
+            let mut file = FileBuilder::new();
+            if is_outside {
+                file.set_attr(name, attribute.clone());
+            }
+            let set = file
+                .create_dataset("force")
+                .with_f64_data(&samples)
+                .with_shape(&[5]);
+            if !is_outside {
+                set.set_attr(name, attribute);
+            }
+            file.finish().expect("a file")
+        };
+        let (path, column) = match is_tdms {
+            true => ("f.tdms", "g.force"),
+            false => ("f.h5", "force"),
+        };
+        let tables = Table::parse_all(path, &*bytes, &TableFormat::default())
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         let table = &tables[0];
-        let read = table.column("force").expect("a column");
+        let read = table.column(column).expect("a column");
         let near = |x: f64, y: f64| (x - y).abs() <= 1e-12 * y.abs();
         let is_stated = match kind {
             "unit" => table.unit(0) == Some("kN"),
-            "factor" => near(read[3], 8.0 * value),
-            "offset" => near(read[3], 8.0 + value),
+            "factor" if !is_tdms => near(read[3], 8.0 * value),
+            "offset" if !is_tdms => near(read[3], 8.0 + value),
             "rate" => {
                 let step = if name.starts_with('d') || name.contains("interval") {
                     value
@@ -223,6 +298,6 @@ fn attributes() {
                 .iter()
                 .any(|stated| stated.contains(name)),
         };
-        assert!(is_stated, "{name} = {value} ({kind})");
+        assert!(is_stated, "{path}: {name} = {value} ({kind})");
     }
 }

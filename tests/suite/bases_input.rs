@@ -433,68 +433,23 @@ fn limits() {
 
 #[test]
 fn penalties() {
-    let smooth = |text: &str| message(&format!("{{basis: nodal, start: 1, smooth: {text}}}"));
-    assert_snapshot!(smooth("{order: 3, weight: 1}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 2, weight: -1}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("[{order: 2, weight: 1}, {order: 1, weight: -0.5}]"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 2, weight: discrepency}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 2, weight: 1e-3 s}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 2, weight: [1]}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{weight: 1}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 2}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 2, weigth: 1}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("2"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("[{order: 2, weight: 1}, 3]"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
-    assert_snapshot!(smooth("{order: 1, weight: 1, reference: 2}"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
-    ");
     let with = |text: &str| message(&format!("{{basis: nodal, start: 1, {text}}}"));
+    assert_snapshot!(with("penalty: {kind: tikhonov, order: 2, weight: discrepency}"), @"
+    m.yaml:5:78: functions.mass.penalty.weight: unknown choice
+      found: `discrepency`
+      expected: a finite number, or one of: discrepancy, reml, period, bic
+      hint: did you mean `discrepancy`?
+    ");
+    assert_snapshot!(with("penalty: {kind: tikhonov, order: 2}"), @"
+    m.yaml:5:34: functions.mass.penalty: the key `weight` is missing
+      expected: the key `weight`
+    ");
+    assert_snapshot!(with("penalty: {kind: tikhonov, order: 2, weigth: 1}"), @"
+    m.yaml:5:70: functions.mass.penalty: unknown key
+      found: `weigth`
+      expected: one of: kind, order, weight, reference
+      hint: did you mean `weight`?
+    ");
     assert_snapshot!(with("penalty: {kind: tv, weight: -1}"), @"
     m.yaml:5:62: functions.mass.penalty.weight: a weight cannot be negative
       found: -1
@@ -504,10 +459,5 @@ fn penalties() {
     m.yaml:5:62: functions.mass.penalty.weight: the weight of total variation has the rule `bic` only
       found: `discrepancy`
       expected: `bic`, or a finite number
-    ");
-    assert_snapshot!(with("variation: 1"), @"
-    m.yaml:5:34: functions.mass: unknown key
-      found: `variation`
-      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
 }

@@ -34,7 +34,7 @@ fn tour() -> &'static Tour {
 fn commands_print_what_is_shown() {
     assert!(tour().steps.len() >= 8, "{}", tour().steps.len());
     tour().holds();
-    for name in ["records", "paper", "studies"] {
+    for name in ["records", "paper"] {
         let tour = Tour::of(&page(&format!("docs/{name}.md")));
         assert!(!tour.steps.is_empty(), "{name}");
         tour.holds();

@@ -5,7 +5,7 @@ use kmcfit::tables::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec, Start,
 };
-use kmcfit_core::internals::constraints::{Constraint, Shape};
+use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel};
@@ -262,7 +262,10 @@ fn invalid_parts_are_refused_with_their_key() {
             "functions.mass.fixed: not a finite number\n  found: inf",
         ),
         (
-            mass(CoefficientSpec::fixed_at_nodes(vec![1.0; 3])),
+            mass(CoefficientSpec::known(TimeHistory::Nodal {
+                name: "known".into(),
+                values: vec![1.0; 3],
+            })),
             "functions.mass.fixed: the number of values differs from that of the nodes\n  found: 3 values\n  expected: 2000 values",
         ),
         (

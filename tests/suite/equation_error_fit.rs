@@ -11,8 +11,9 @@ use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit,
 };
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, Term,
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -46,7 +47,7 @@ fn system() -> System {
     System {
         grid: Grid::new(0.0, 60.0, NODES).unwrap(),
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

@@ -5,7 +5,7 @@
 
 use crate::common::pages::page;
 use crate::common::repository;
-use kmcfit::config::key_documentation::{Found, KeyDoc, KeyGroup, MODEL, SEQUENCE, ValueType, all};
+use kmcfit::config::key_documentation::{Found, KeyDoc, KeyGroup, MODEL, ValueType, all};
 use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
 use std::fs;
@@ -193,7 +193,7 @@ fn key_reference() -> String {
     let keys = all();
     let mut groups: Vec<&KeyGroup> = vec![MODEL];
     let nested = keys.iter().flat_map(|found| found.key.kind.groups());
-    for group in nested.chain([SEQUENCE]) {
+    for group in nested {
         if !groups.iter().any(|known| known.name == group.name) {
             groups.push(group);
         }

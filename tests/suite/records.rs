@@ -3,8 +3,9 @@
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, Term,
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -32,7 +33,7 @@ fn motion(
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     // The right end of a step is evaluated just before a jump at the node.
     let steps = |f: &dyn Fn(f64) -> f64| {

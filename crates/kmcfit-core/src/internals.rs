@@ -6,11 +6,11 @@ pub mod assessment {
         AmplitudeRival, BEYOND_SIGMA, BasisComparison, BasisTest, ClassicalEstimate,
         ClassicalMethod, CoarseBasis, EXACT, EquationErrorIntervals, Estimate, EstimateErrors,
         EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics, FitWarning,
-        FunctionSummary, Implausible, LargeCovariance, MOST_WITH_COVARIANCE, ModelTests,
-        NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern,
-        SampleFault, StepCheck, TruthErrors, Unidentified, VerdictAssumption, VerdictLevel,
-        VerdictReason, all_diagnostics, estimates, function_summaries, outliers, pattern,
-        standard_error, verdict_assumptions, verdict_level, verdict_reasons,
+        FunctionSummary, Implausible, LargeCovariance, ModelTests, NoIntervals, POOR, Plausibility,
+        RECOVERY_TOLERANCE, RecordError, ResidualPattern, SampleFault, StepCheck, TruthErrors,
+        Unidentified, VerdictAssumption, VerdictLevel, VerdictReason, all_diagnostics, estimates,
+        function_summaries, outliers, pattern, standard_error, verdict_assumptions, verdict_level,
+        verdict_reasons,
     };
 }
 pub mod builder {
@@ -52,9 +52,7 @@ pub mod identifiability {
     pub use crate::spans::span_words;
 }
 pub mod objective {
-    pub use crate::objective::{
-        Evaluation, GradientCheck, GradientKind, SimulatedRecord, state_scales,
-    };
+    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
 }
 pub mod problem {
     pub use crate::problem::{Jumps, Problem, ProblemError, ProblemParts};
@@ -85,10 +83,10 @@ pub mod signal {
 pub mod simd {
     pub use crate::simd::{LIMIT, arithmetics, check_limit};
 }
-pub mod simulate {
-    pub use crate::simulate::{
-        Cause, Engine, EngineMode, SimulationError, Trajectory, arithmetic, continuous_adjoint,
-        reference,
+pub mod step {
+    pub use crate::step::{
+        Cause, Driven, EngineMode, SimulationError, Trajectory, arithmetic, continuous_adjoint,
+        observe,
     };
 }
 pub mod solvers {
@@ -104,6 +102,9 @@ pub mod solvers {
         number_or_nan, predict_validation, timed,
     };
 }
+pub mod structure {
+    pub use crate::structure::Law;
+}
 pub mod study {
     pub use crate::study::{
         Choice, EquivalentSystem, IdentifiedSystem, Linear, PredictedChannel, PredictedResponse,
@@ -114,7 +115,7 @@ pub mod study {
 pub mod system {
     pub use crate::system::{
         Excitation, Grid, InputQuantity, InputSample, Method, NodalCoefficients, StageSamples,
-        State, System, SystemTangent, Term, TimePoint, quadrature, round_time,
+        State, System, SystemTangent, TimePoint, quadrature, round_time,
     };
 }
 pub mod threads {

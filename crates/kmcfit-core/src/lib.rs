@@ -24,7 +24,7 @@
 //!
 //! ```
 //! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record, Status};
-//! use kmcfit_core::{Grid, Method, NodalCoefficients, State, System, Term};
+//! use kmcfit_core::{Grid, Method, NodalCoefficients, State, System, Law};
 //!
 //! // The system: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
 //! let grid = Grid::new(0.0, 25.0, 1001).ok_or("a grid")?;
@@ -33,7 +33,7 @@
 //!     mass: times.iter().map(|t| 1.0 - t / 50.0).collect(),
 //!     coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
 //! };
-//! let terms = vec![Term::Damping, Term::Stiffness];
+//! let terms = vec![Law::Damping, Law::Stiffness];
 //! let system = System { grid, method: Method::Rk4, terms };
 //! let response = system.forward(&truth, State { displacement: 3.3, velocity: 1.0 }, None)?;
 //!
@@ -73,9 +73,10 @@ mod record;
 mod rows;
 mod signal;
 mod simd;
-mod simulate;
 mod solvers;
 mod spans;
+mod step;
+mod structure;
 mod study;
 mod system;
 mod threads;
@@ -92,10 +93,11 @@ pub use functions::{CoefficientKind, Prior, WeightRule};
 pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, InputErrorKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
-pub use system::{Excitation, Grid, InputQuantity, Method, NodalCoefficients, State, System, Term};
+pub use system::{Excitation, Grid, InputQuantity, Method, NodalCoefficients, State, System};
 // Simulation and cost.
-pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
-pub use simulate::{Cause, SimulationError, Trajectory};
+pub use objective::{Evaluation, Gradient, GradientKind};
+pub use step::{Cause, SimulationError, Trajectory};
+pub use structure::Law;
 // Fits.
 pub use solvers::{
     Attempt, Fit, FitSettings, Initial, Optimality, Outcome, QpSolver, Reason, SolveCounts, Solver,

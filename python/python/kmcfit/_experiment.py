@@ -214,7 +214,7 @@ class Experiment:
             value = plain(value)
             if isinstance(value, list):
                 values = column(f"Experiment.sigma[{name!r}]", sigma[name])
-                _check_length(f"Experiment.sigma[{name!r}]", values, len(self), "the record")
+                _check_length(f"Experiment.sigma[{name!r}]", values, len(self._columns.get(str(name), values)), "the channel")
                 self._columns[f"sigma {name}"] = values
                 value = f"sigma {name}"
             spec[str(name)] = value

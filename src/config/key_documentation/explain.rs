@@ -1,6 +1,7 @@
 //! `kmcfit explain`: documentation of a key as text.
 
 use super::{Found, MODEL, ValueType, all};
+use crate::config::retired::successor_of_name;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::quote;
@@ -55,6 +56,11 @@ fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
     let error = InputError::argument("explain", "unknown key")
         .found(quote(name))
         .expected("a key of a model file, such as `sigma` or `functions.mass`; `kmcfit explain` lists the top-level keys");
+    if let Some(successor) = successor_of_name(wanted) {
+        return InputError::argument("explain", "this key was removed")
+            .found(quote(name))
+            .hint(successor);
+    }
     let last = wanted.rsplit('.').next().unwrap_or_default();
     let paths = || keys.iter().flat_map(|f| f.paths.iter().map(String::as_str));
     let names = || keys.iter().map(|f| f.key.name);

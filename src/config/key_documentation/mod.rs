@@ -7,13 +7,10 @@ pub use super::key::{KeyDoc, KeyGroup, ValueType};
 pub use explain::explain;
 pub use schema::schema;
 
-use super::sequence::SequenceSpec;
 use super::spec::ModelSpec;
 
 /// The keys of a model.
 pub static MODEL: &KeyGroup = ModelSpec::GROUP;
-/// The keys of a sequence.
-pub static SEQUENCE: &KeyGroup = SequenceSpec::GROUP;
 
 /// A key with its paths.
 #[derive(Debug, Clone)]
@@ -28,7 +25,6 @@ pub struct Found {
 pub fn all() -> Vec<Found> {
     let mut found = Vec::new();
     collect(MODEL, "", &mut found);
-    collect(SEQUENCE, "", &mut found);
     found
 }
 

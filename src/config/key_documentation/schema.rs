@@ -1,22 +1,19 @@
 //! JSON schema (draft 07) of a model file, for completion and validation in editors.
 
-use super::{KeyDoc, KeyGroup, MODEL, SEQUENCE, ValueType};
+use super::{KeyDoc, KeyGroup, MODEL, ValueType};
 use serde_json::{Map, Value, json};
 
-/// The schema of a model file or a sequence.
+/// The schema of a model file.
 ///
 /// The schema covers keys, types and choices; relations between keys are checked by the program.
 pub fn schema() -> Value {
     let mut definitions = Map::new();
     define(MODEL, &mut definitions);
-    define(SEQUENCE, &mut definitions);
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "kmcfit model file",
-        "description": "A model of an oscillator and its records, or a sequence of several models.",
-        "if": {"type": "object", "required": ["sequence"]},
-        "then": reference(SEQUENCE),
-        "else": reference(MODEL),
+        "description": "A model of an oscillator and its records.",
+        "allOf": [reference(MODEL)],
         "definitions": definitions,
     })
 }

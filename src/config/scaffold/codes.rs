@@ -8,7 +8,7 @@ const KNOWN: [f64; 11] = [
     999.0, 999.9, 999.99, 7999.0, 8888.0, 9999.0, 9999.9, 9999.99, 99_999.0, 999_999.0, 1e20,
 ];
 /// Distance of a code from the median, relative to the largest one of other values: of a known code, of another value that repeats, and of
-/// a single one, which no motion reaches: the largest and the smallest sample of a sensor are five decades apart at most.
+/// a single one. Below three decades a single one is a spike, which a robust loss takes.
 const FAR: [f64; 3] = [3.0, 10.0, 1000.0];
 /// Fewest repetitions of another value.
 const REPEATED: usize = 2;

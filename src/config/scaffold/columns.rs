@@ -2,7 +2,7 @@
 
 use super::quoted;
 use super::roles::{Role, UsedColumn, known};
-use super::statements::{ColumnStatements, Statements};
+use super::statements::{ColumnStatements, OTHER_FILE, Statements};
 use crate::error::InputError;
 use crate::quantity_names::{is_drive, is_foreign};
 use crate::tables::{Duplicates, Table, increasing_at, repeated_times};
@@ -13,7 +13,6 @@ use kmcfit_core::internals::diagnostics::standard_deviation;
 const MUCH: f64 = 3.0;
 /// Rows for each of which a clock may step back once.
 const FEW_STEPS: usize = 20;
-/// Remedy for a column of times that cannot be used.
 const OTHER_TIMES: &str = "correct the times in the file; `--sample-rate HZ` replaces them if the samples are equally spaced, `--time COLUMN` names another column";
 
 /// Columns of a table by role, and unused columns.
@@ -21,6 +20,8 @@ const OTHER_TIMES: &str = "correct the times in the file; `--sample-rate HZ` rep
 pub struct ColumnAssignment {
     pub used: Vec<UsedColumn>,
     unused: Vec<usize>,
+    /// Sampling rate that an option or, without times, the file states, Hz.
+    pub sample_rate: Option<f64>,
 }
 
 impl ColumnAssignment {
@@ -80,17 +81,22 @@ impl ColumnAssignment {
         stated: &ColumnStatements,
     ) -> Result<Self, InputError> {
         let known = |table: &Table, index: usize| stated.recognise(table, index);
-        let mut numeric = Vec::new();
+        let is_time = |i: usize| known(table, i).is_some_and(|c| c.role == Role::Time);
+        let of_file = || {
+            table
+                .stated_rate()
+                .filter(|_| !(0..table.width()).any(is_time))
+        };
+        let sample_rate = sample_rate.or_else(of_file);
+        let (mut numeric, mut no_times) = (Vec::new(), None);
         for i in 0..table.width() {
             match table.samples(i) {
                 Ok(samples) if samples.iter().any(|x| x.is_finite()) => numeric.push(i),
                 Ok(_) => {}
                 // A recognised name requires numbers.
                 Err(error) => match known(table, i).map(|column| column.role) {
-                    Some(Role::Time) if sample_rate.is_some() => {}
-                    Some(Role::Time) => {
-                        return Err(error.hint(OTHER_TIMES));
-                    }
+                    // A column of dates can stand beside one of times.
+                    Some(Role::Time) => no_times = no_times.or(Some(error)),
                     Some(_) => return Err(error),
                     None => {}
                 },
@@ -99,8 +105,12 @@ impl ColumnAssignment {
         let mut columns = Self {
             used: Vec::new(),
             unused: Vec::new(),
+            sample_rate,
         };
         if sample_rate.is_none() {
+            if let Some(error) = no_times.filter(|_| !numeric.iter().any(|i| is_time(*i))) {
+                return Err(error.hint(OTHER_TIMES));
+            }
             columns.used.push(time(table, &numeric, &known)?);
         }
         // Voltages stand for a response only where no other column does.
@@ -166,7 +176,9 @@ impl ColumnAssignment {
                 .found(format!("no number in the column `{label}`"))
                 .expected("at least one sample"));
         }
-        let is_open = |i: &usize| !is_foreign(table.quantity_name(*i));
+        // A number of the sample is no response.
+        let is_counter = |i: usize| self.sample_rate.is_some() && increasing_at(table, i).is_ok();
+        let is_open = |i: &usize| !is_foreign(table.quantity_name(*i)) && !is_counter(*i);
         let has_no_unit = |i: &usize| is_open(i) && table.unit(*i).is_none();
         let place = self.unused.iter().position(has_no_unit);
         let Some(place) = place.or_else(|| self.unused.iter().position(is_open)) else {
@@ -276,8 +288,16 @@ impl ColumnAssignment {
                 Role::BaseDisplacement => "displacement of the base".to_owned(),
                 _ => role,
             };
+            let unapplied = match table.unapplied(c.index) {
+                [] => String::new(),
+                _ if c.is_stated => String::new(),
+                stated => format!(
+                    "; the file states {}, which is not applied",
+                    stated.join(", ")
+                ),
+            };
             format!(
-                "column `{}`: {role}, {}{guess}",
+                "column `{}`: {role}, {}{guess}{unapplied}",
                 table.label(c.index),
                 c.unit_in_words()
             )
@@ -368,7 +388,8 @@ fn time(
             }
             Err(InputError::file(table.path(), "no column of times")
                 .found("no column whose numbers increase from row to row")
-                .expected("a column of times, `--time COLUMN`, or `--sample-rate HZ`"))
+                .expected("a column of times, `--time COLUMN`, or `--sample-rate HZ`")
+                .hint(OTHER_FILE))
         }
     }
 }

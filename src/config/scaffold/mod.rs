@@ -7,6 +7,7 @@ mod columns;
 mod functions;
 mod record_summary;
 mod roles;
+mod sensors;
 mod statements;
 
 use crate::error::InputError;
@@ -18,6 +19,7 @@ pub(super) use columns::ColumnAssignment;
 pub use columns::{rate, recognised};
 use record_summary::RecordSummary;
 pub use roles::Role;
+use sensors::sensors;
 pub use statements::Statements;
 use std::path::{Path, PathBuf};
 
@@ -86,7 +88,7 @@ fn read<'a>(
                 false => is_used.iter().zip(used).map(|(a, b)| *a || b).collect(),
             };
             let codes = codes::codes(&table, columns.measured());
-            let summary = RecordSummary::of(&table, &columns, statements.sample_rate, &codes)?;
+            let summary = RecordSummary::of(&table, &columns, &codes)?;
             records.push(FileRecord {
                 source,
                 table,
@@ -231,7 +233,7 @@ fn text(records: &[FileRecord], statements: &Statements) -> String {
             quoted(&name),
             quoted(&record.source.name)
         );
-        for (key, value, comment) in keys(record, statements.sample_rate) {
+        for (key, value, comment) in keys(record) {
             if let Some(value) = value {
                 text += &commented(&format!("{key}: {value}"), &comment);
             }
@@ -267,7 +269,6 @@ fn keys(
         codes,
         ..
     }: &FileRecord,
-    sample_rate: Option<f64>,
 ) -> Vec<(&'static str, Option<String>, String)> {
     let sigmas: Vec<String> = (columns.channels())
         .map(|role| format!("{}: estimate", role.key()))
@@ -285,7 +286,11 @@ fn keys(
             Some(columns.named(table)),
             "by name or by number from 1",
         ),
-        ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
+        (
+            "    sample_rate",
+            columns.sample_rate.map(|r| r.to_string()),
+            "Hz",
+        ),
         ("    units", columns.units(), "converted to SI"),
         (
             "    # units",
@@ -344,52 +349,6 @@ fn keys(
     ];
     let owned = keys.map(|(key, value, comment)| (key, value, comment.to_owned()));
     owned.into()
-}
-
-/// Words for a motion measured from the base, and from the ground.
-const RELATIVE: [&str; 4] = ["relative", "rel", "drift", "deformation"];
-const ABSOLUTE: [&str; 2] = ["absolute", "abs"];
-
-/// Sensors with estimated parameters, and the reasons.
-fn sensors(
-    columns: &ColumnAssignment,
-    table: &Table,
-    record: &RecordSummary,
-) -> (Vec<&'static str>, Vec<&'static str>) {
-    let mut sensors = Vec::new();
-    if columns.has(Role::Acceleration) {
-        let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
-        sensors.push(
-            match has_base && columns.is_named(table, Role::Acceleration, &RELATIVE) {
-                true => (
-                    "acceleration: {offset: estimate, absolute: false}",
-                    "relative to the base, by its name; accelerometers usually have an offset",
-                ),
-                false => (
-                    "acceleration: {offset: estimate}",
-                    "accelerometers usually have an offset; remove the line if yours has none",
-                ),
-            },
-        );
-    }
-    if columns.has(Role::Displacement) {
-        sensors.push(match record.drifts {
-            true => (
-                "displacement: {offset: estimate, drift: estimate}",
-                "the record oscillates about a sloping line",
-            ),
-            false if columns.is_named(table, Role::Displacement, &ABSOLUTE) && columns.has(Role::BaseDisplacement) => (
-                "displacement: {offset: estimate, absolute: true}",
-                "relative to the ground, by its name; the zero of a displacement is seldom that of the rest position",
-            ),
-            // A small offset is invisible in a short record and changes frequency and damping.
-            false => (
-                "displacement: {offset: estimate}",
-                "the zero of a displacement is seldom that of the rest position; remove the line if yours is",
-            ),
-        });
-    }
-    sensors.into_iter().unzip()
 }
 
 /// A line followed by a comment, aligned where the line is short enough.

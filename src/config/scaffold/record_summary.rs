@@ -51,10 +51,9 @@ impl RecordSummary {
     pub fn of(
         table: &Table,
         columns: &ColumnAssignment,
-        sample_rate: Option<f64>,
         codes: &[(f64, usize)],
     ) -> Result<Self, InputError> {
-        let (times, repeated) = times(table, columns, sample_rate)?;
+        let (times, repeated) = times(table, columns)?;
         let in_si = |table, column| in_si(table, column, &repeated, codes);
         let channel = |role: Role| columns.find(role);
         let order = [Role::Displacement, Role::Velocity, Role::Acceleration];
@@ -171,7 +170,6 @@ fn between(input: &[f64]) -> &'static str {
 fn times(
     table: &Table,
     columns: &ColumnAssignment,
-    sample_rate: Option<f64>,
 ) -> Result<(Vec<f64>, RepeatedTimes), InputError> {
     match columns.find(Role::Time) {
         Some(column) => {
@@ -181,7 +179,7 @@ fn times(
             Ok((times.collect(), repeated))
         }
         None => {
-            let rate = sample_rate.unwrap_or(1.0);
+            let rate = columns.sample_rate.unwrap_or(1.0);
             let times = (0..table.rows()).map(|i| i as f64 / rate).collect();
             let none = RepeatedTimes {
                 groups: Vec::new(),

@@ -8,6 +8,9 @@ use crate::text_io::{one_of, quote};
 use crate::units::{Quantity, ScaledUnit, Unit, split_factor};
 use kmcfit_core::internals::functions::CoefficientKind;
 
+/// Remedy for a column of times that cannot be used.
+pub(super) const OTHER_FILE: &str = "if another file has the times, write one table of both: `paste -d, TIMES.csv RECORD.csv > both.csv`";
+
 /// Statements of the options, for all files.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Statements {
@@ -177,9 +180,11 @@ impl ColumnStatements {
             let name = quantity.map_or(name.as_str(), |(_, column)| column.trim());
             let index = column_of(table, name).ok_or_else(|| {
                 let labels: Vec<String> = (0..table.width()).map(|i| table.label(i)).collect();
+                let hint = (option == "--time").then(|| OTHER_FILE.to_owned());
                 InputError::argument(option, "no such column")
                     .found(quote(name))
                     .expected(one_of(labels.iter().map(String::as_str)))
+                    .hint_if(hint)
             })?;
             let is_length =
                 || known(table, index).is_some_and(|own| own.role.kind() == Quantity::Displacement);

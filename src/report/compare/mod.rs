@@ -37,6 +37,8 @@ pub struct ComparedRun {
     pub name: String,
     /// Document, estimated coefficients and true system.
     pub finished: Run,
+    /// Digests of the files of its records, windows and bands, channels with their numbers of samples.
+    records: Vec<String>,
 }
 
 impl ComparedRun {
@@ -45,26 +47,26 @@ impl ComparedRun {
     /// # Errors
     /// If there is no complete run in the folder.
     pub fn read(name: &str, folder: &Path) -> Result<Self, InputError> {
+        let finished = Run::open(folder)?;
+        let model = finished.own_model()?;
+        let names = model.record_names();
+        let files = finished.document.sources.iter();
+        let files = files.filter(|file| names.contains(&file.name));
+        let used = model.spec.experiments.iter();
+        let used = used.map(|e| format!("{:?} {:?}", e.window, e.band));
+        let channels = finished.document.channels();
+        let channels = channels.map(|c| format!("{} {}", c.kind, c.samples));
+        let files = files.map(|file| file.sha256.clone());
         Ok(Self {
             name: name.into(),
-            finished: Run::open(folder)?,
+            records: files.chain(used).chain(channels).collect(),
+            finished,
         })
     }
 
-    /// True if another run has the same records: channels, numbers of samples, measured displacements.
+    /// True if another run has the same records.
     fn has_records_of(&self, other: &Self) -> bool {
-        let channels = |run: &Self| -> Vec<(String, usize)> {
-            let channels = run.finished.document.channels();
-            channels.map(|c| (c.kind.clone(), c.samples)).collect()
-        };
-        let displacements = |run: &Self| -> Vec<f64> {
-            let table = &run.finished.trajectory;
-            let observed = table.headers().iter();
-            let observed = observed.filter(|name| name.starts_with("observed_"));
-            let values = observed.filter_map(|name| table.column(name)).flatten();
-            values.filter(|y| y.is_finite()).collect()
-        };
-        channels(self) == channels(other) && displacements(self) == displacements(other)
+        self.records == other.records
     }
 }
 
@@ -93,7 +95,6 @@ pub struct ComparisonDocument<'a> {
 /// Several runs side by side.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    title: String,
     runs: Vec<ComparedRun>,
     measures: Vec<Measures>,
     left_out: Vec<LeftOut>,
@@ -113,19 +114,9 @@ impl Comparison {
             }
         }
         Self {
-            title: format!("Comparison of {} runs", runs.len() + left_out.len()),
             measures,
             runs,
             left_out,
-        }
-    }
-
-    /// Sets the title of the page.
-    #[must_use]
-    pub fn titled(self, title: impl Into<String>) -> Self {
-        Self {
-            title: title.into(),
-            ..self
         }
     }
 
@@ -244,7 +235,11 @@ impl Comparison {
                 validation,
             ),
         ];
-        shell::sectioned(&self.title, &shell::screen(&above, "", None), sections)
+        let title = format!(
+            "Comparison of {} runs",
+            self.runs.len() + self.left_out.len()
+        );
+        shell::sectioned(&title, &shell::screen(&above, "", None), sections)
     }
 
     /// Writes `figures/*.svg` and `compare.html`.

@@ -50,7 +50,10 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
 
 /// Fit of each channel, key figures, and figures of records and residuals.
 fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
-    let drawn = run.channel_fits();
+    let mut drawn = run.channel_fits();
+    // With constants the first screen has the samples.
+    let main = run.main_figure(document);
+    drawn.retain(|figure| (main.as_ref()).is_none_or(|main| main.title != figure.title));
     let equation = document.equation.iter();
     let equation =
         equation.map(|b| equation_residual(b, document.is_rotation(), document.model.mass_unknown));

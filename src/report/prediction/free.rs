@@ -4,7 +4,7 @@ use super::identified::system_of;
 use crate::number_format::significant;
 use crate::report::{Run, prediction_table};
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::simulate::SimulationError;
+use kmcfit_core::internals::step::SimulationError;
 use kmcfit_core::internals::study::{PredictedResponse, PredictionSummary, predict};
 use kmcfit_core::internals::system::State;
 use serde::Serialize;

@@ -1,4 +1,4 @@
-//! The document of a study, `study.json`, and the records of its analyses, which the journal keeps as well.
+//! The document of a study, `study.json` and the records of its analyses.
 
 use crate::finding::Finding;
 use crate::report::document::Verdict;

@@ -1,4 +1,4 @@
-//! Results of a study: `study.json`, `study.html` and figures. The records of finished analyses are kept in a journal.
+//! Results of a study: `study.json`, `study.html` and figures.
 
 mod bands;
 mod document;

@@ -11,6 +11,8 @@ use crate::number_format::significant;
 use kmcfit_core::internals::assessment::{EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::functions::{CoefficientKind, ScalarValue};
+use kmcfit_core::internals::record::{BaseMotion, Waveform};
+use kmcfit_core::internals::signal::Interpolation;
 use kmcfit_core::internals::solvers::{FEW_PARAMETERS, Solver, StartStrategy, Status};
 use residuals::{about_misfit, about_patterns};
 use serde::Deserialize;
@@ -113,6 +115,7 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     steps.extend(about_means(document));
     steps.extend(about_terms(document));
     steps.extend(about_friction(document));
+    steps.extend(about_disturbance(document, model));
     steps.extend(about_interpolation(document));
     if document.fit_warning("time_or_amplitude").is_some() {
         steps.push(Suggestion::outside(
@@ -357,6 +360,30 @@ fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
         "narrow_friction",
         "the estimates depend on the width of Coulomb friction: reduce it",
         vec![format!("functions.coulomb_friction.width={width}")],
+    ))
+}
+
+/// Noise of the sensor of an input, with cubics where lines connect its samples, as these lose a share of it.
+fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
+    let disturbed = document.fit_warning("disturbed_input")?;
+    let i = place(document, &text_of(disturbed, "experiment")?)?;
+    let (name, sigma) = (text_of(disturbed, "input")?, number_of(disturbed, "sigma")?);
+    let input = &model.problem.experiments[i].input;
+    let (part, signal) = match (&input.force, &input.base) {
+        (Some(Waveform::Samples(signal)), _) => ("force", signal),
+        (_, Some(BaseMotion::Acceleration(signal))) => ("base", signal),
+        _ => return None,
+    };
+    let is_linear = signal.interpolation() == Interpolation::Linear;
+    let cubics = is_linear.then(|| format!("experiments.{i}.{part}.interpolation=cubic"));
+    let noise = format!(
+        "experiments.{i}.sigma.{name}={{value: {}, kind: sensor}}",
+        written(sigma)
+    );
+    Some(Suggestion::change(
+        "input_noise",
+        format!("state the noise of the {} sensor", name.replace('_', " ")),
+        std::iter::once(noise).chain(cubics).collect(),
     ))
 }
 

@@ -18,7 +18,7 @@ use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Waveform};
 use crate::signal::{Mobility, even_spacing};
 use crate::simd::sum::rms;
-use crate::system::Term;
+use crate::structure::Law;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -73,7 +73,7 @@ pub(super) fn classical_estimate(
     let functions = &problem.functions;
     let set = functions.coefficient_set(0);
     let is_constant = set.iter().all(|f| functions.is_constant_or_known(*f));
-    let is_linear = problem.system.terms == [Term::Damping, Term::Stiffness];
+    let is_linear = problem.system.terms == [Law::Damping, Law::Stiffness];
     let ratios = Ratios::of(&evaluation.nodal);
     is_linear.then_some(())?;
     let is_steady = |values: &[f64]| values.iter().all(|v| *v == values[0]);

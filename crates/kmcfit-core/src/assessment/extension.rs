@@ -2,19 +2,19 @@
 
 use crate::functions::{CoefficientFunction, CoefficientSet, Parameterization};
 use crate::problem::Problem;
-use crate::system::Term;
+use crate::structure::Law;
 
 /// The problem with further coefficients, at zero, and their terms, without penalties and constraints, and its parameters.
 pub(super) fn extended(
     problem: &Problem,
     theta: &[f64],
-    further: Vec<(CoefficientFunction, Term)>,
+    further: Vec<(CoefficientFunction, Law)>,
 ) -> Option<(Problem, Vec<f64>)> {
     let functions = &problem.functions;
     let (nodes, step) = (functions.nodes(), problem.system.grid.step());
     let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
     let first = list.len();
-    let (new, terms): (Vec<CoefficientFunction>, Vec<Term>) = further.into_iter().unzip();
+    let (new, terms): (Vec<CoefficientFunction>, Vec<Law>) = further.into_iter().unzip();
     let zeros = vec![0.0; new.iter().map(CoefficientFunction::parameters).sum()];
     list.extend(new);
     let set = |set: &CoefficientSet| {
@@ -36,7 +36,7 @@ pub(super) fn extended(
 pub(super) fn with_functions(
     problem: &Problem,
     functions: Parameterization,
-    terms: Vec<Term>,
+    terms: Vec<Law>,
 ) -> Option<Problem> {
     let changed = problem.clone().with(|parts| {
         parts.functions = functions;

@@ -111,6 +111,7 @@ fn disturbed(
         kind: InputErrorKind::Sensor,
         sigma: size,
         times: signal.times().to_vec(),
+        interpolation: signal.interpolation(),
     };
     let count = residuals.len().min(MOST_SAMPLES);
     let residuals = &residuals[..count];

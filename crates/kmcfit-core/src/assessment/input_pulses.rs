@@ -20,7 +20,8 @@ use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::signal::Signal;
 use crate::solvers::weighted_jacobian;
-use crate::system::{Grid, InputQuantity, Term};
+use crate::structure::Law;
+use crate::system::{Grid, InputQuantity};
 use nalgebra::{DMatrix, DVector};
 
 /// Smallest score of a first pulse: the largest of 10,000 standard normal numbers exceeds it with a probability of 0.0004.
@@ -58,7 +59,7 @@ pub(super) fn input_pulses(
     (is_force && !has_static_force && is_short && is_few).then_some(())?;
     applies(problem, theta, evaluation).then_some(())?;
     let pulses = CoefficientFunction::nodal(CoefficientKind::Offset, vec![0.0; nodes]);
-    let (extended, at) = extended(problem, theta, vec![(pulses, Term::Offset)])?;
+    let (extended, at) = extended(problem, theta, vec![(pulses, Law::Offset)])?;
     let evaluation = extended.evaluate(&at).ok()?;
     let jacobian = weighted_jacobian(&extended, &evaluation);
     let first = problem.functions.scalar_range().start;

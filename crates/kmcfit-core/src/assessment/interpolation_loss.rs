@@ -59,7 +59,7 @@ fn with_cubics(problem: &Problem, e: usize) -> Option<(InputQuantity, Signal)> {
             (signal.interpolation() == Interpolation::Linear).then_some(())?;
             (input, signal.times().to_vec(), signal.values().to_vec())
         }
-        (None, Some(error)) => {
+        (None, Some(error)) if error.interpolation == Interpolation::Linear => {
             let excitation = experiment.excitation.as_ref()?;
             let part = match error.quantity {
                 InputQuantity::Force => &excitation.force,
@@ -77,7 +77,7 @@ fn with_cubics(problem: &Problem, e: usize) -> Option<(InputQuantity, Signal)> {
             let values = error.times.iter().map(at).collect();
             (error.quantity, error.times.clone(), values)
         }
-        (None, None) => return None,
+        _ => return None,
     };
     let cubic = Signal::new(times, values, Interpolation::Cubic)?;
     Some((input, cubic))

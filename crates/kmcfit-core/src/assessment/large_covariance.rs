@@ -14,20 +14,14 @@ use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::{BandedFactor, Subproblem};
 use crate::record::{Loss, ScoreCovariance};
 use crate::solvers::{add_penalties, add_priors, add_soft, linear_predictions};
-use nalgebra::DMatrix;
 
-/// Largest number of parameters with a full covariance.
-pub const MOST_WITH_COVARIANCE: usize = 1000;
-
-/// Covariance of the estimates of a fit with more than 64 parameters.
+/// Errors of the estimates of a fit with more than 64 parameters.
 #[derive(Debug, Clone)]
 pub struct LargeCovariance {
     /// Kind of the covariance.
     pub kind: CovarianceKind,
     /// Variance of each scalar: initial states and sensor parameters.
     pub scalar_variances: Vec<f64>,
-    /// Covariance of the parameters, up to 1000 of them.
-    pub covariance: Option<DMatrix<f64>>,
     functions: Vec<MeanOverRecord>,
     ratios: Vec<(&'static str, MeanOverRecord)>,
 }
@@ -53,8 +47,6 @@ impl LargeCovariance {
             let error = normal.variance(&mean.gradient, &shift).max(0.0).sqrt();
             mean.standard_error = error.hypot(mean.basis_error);
         }
-        let covariance = (problem.parameters() <= MOST_WITH_COVARIANCE)
-            .then(|| normal.covariance_of_parameters(&shift));
         let scalar = |index: usize| {
             let mut unit = vec![0.0; normal.parameters];
             unit[index] = 1.0;
@@ -62,12 +54,9 @@ impl LargeCovariance {
         };
         let scalar_variances: Vec<f64> = problem.functions.scalar_range().map(scalar).collect();
         let is_known = |variance: &f64| variance.is_finite() && *variance >= 0.0;
-        let diagonal = covariance.as_ref().map(|covariance| covariance.diagonal());
-        let mut all = diagonal.iter().flatten().chain(&scalar_variances);
-        all.all(is_known).then_some(Self {
+        scalar_variances.iter().all(is_known).then_some(Self {
             kind: normal.kind,
             scalar_variances,
-            covariance,
             functions,
             ratios,
         })
@@ -162,20 +151,5 @@ impl NormalMatrix {
     fn variance(&self, gradient: &[f64], shift: &[f64]) -> f64 {
         let dot = |a: &[f64]| a.iter().zip(gradient).map(|(a, b)| a * b).sum::<f64>();
         dot(&self.times(gradient)) + dot(shift).powi(2)
-    }
-
-    fn covariance_of_parameters(&self, shift: &[f64]) -> DMatrix<f64> {
-        let n = self.parameters;
-        let mut once = DMatrix::zeros(n, n);
-        let mut unit = vec![0.0; n];
-        for (j, mut column) in once.column_iter_mut().enumerate() {
-            unit[j] = 1.0;
-            let product = self.times(&unit);
-            unit[j] = 0.0;
-            for (i, (entry, c)) in column.iter_mut().zip(product).enumerate() {
-                *entry = c + shift[i] * shift[j];
-            }
-        }
-        0.5 * (&once + once.transpose())
     }
 }

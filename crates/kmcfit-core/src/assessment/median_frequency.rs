@@ -4,12 +4,12 @@ use crate::functions::Ratios;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::signal::median;
-use crate::system::Term;
+use crate::structure::Law;
 
 /// Median natural frequency at the optimum, Hz; `None` without a mass and a stiffness that define one.
 pub(super) fn median_frequency(problem: &Problem, evaluation: &Evaluation) -> Option<f64> {
     let terms = &problem.system.terms;
-    (terms.len() > 1 && terms[..2] == [Term::Damping, Term::Stiffness]).then_some(())?;
+    (terms.len() > 1 && terms[..2] == [Law::Damping, Law::Stiffness]).then_some(())?;
     let mut defined = Ratios::of(&evaluation.nodal).frequency;
     defined.retain(|f| f.is_finite());
     let frequency = (!defined.is_empty()).then(|| median(defined))?;

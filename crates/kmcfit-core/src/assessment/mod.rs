@@ -45,7 +45,7 @@ pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
-pub use large_covariance::{LargeCovariance, MOST_WITH_COVARIANCE};
+pub use large_covariance::LargeCovariance;
 pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use record_error::RecordError;

@@ -14,7 +14,7 @@ use super::minimum::Minimum;
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
 use crate::solvers::reduced_jacobian;
-use crate::system::Term;
+use crate::structure::Law;
 use nalgebra::{DMatrix, DVector};
 
 /// Linearised model with constants for the functions that vary, and with the terms of all rivals.
@@ -37,7 +37,7 @@ impl RivalScreen {
         problem: &Problem,
         theta: &[f64],
         indices: &[usize],
-        terms: &[(CoefficientKind, Term)],
+        terms: &[(CoefficientKind, Law)],
     ) -> Option<Self> {
         let nodes = problem.functions.nodes();
         let further = terms

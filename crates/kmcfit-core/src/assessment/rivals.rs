@@ -26,7 +26,7 @@ use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Loss, Weighting};
 use crate::solvers::{Fit, FitSettings, Stopping, fit_from};
-use crate::system::Term;
+use crate::structure::Law;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use std::f64::consts::PI;
@@ -266,7 +266,7 @@ fn is_near(kinds: &[CoefficientKind]) -> bool {
 }
 
 /// Terms of all rivals that the model does not have.
-fn terms(problem: &Problem, response: &Response) -> Vec<(CoefficientKind, Term)> {
+fn terms(problem: &Problem, response: &Response) -> Vec<(CoefficientKind, Law)> {
     let width = WIDTH * response.speed;
     let all = [STIFFNESS, DAMPING].map(|kinds| absent(problem, kinds));
     let all = all.into_iter().flatten();
@@ -478,7 +478,7 @@ fn rival(
     }
     let first = list.len();
     let width = WIDTH * response.speed;
-    let terms: Vec<Term> = kinds.iter().filter_map(|kind| kind.term(width)).collect();
+    let terms: Vec<Law> = kinds.iter().filter_map(|kind| kind.term(width)).collect();
     let more = kinds.iter().zip(&new);
     list.extend(more.map(|(kind, start)| CoefficientFunction::constant(*kind, *start, nodes)));
     start.extend(&new);

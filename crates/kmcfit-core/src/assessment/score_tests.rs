@@ -24,9 +24,9 @@ use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::simd::sum::rms;
-use crate::simulate::Trajectory;
 use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
-use crate::system::Term;
+use crate::step::Trajectory;
+use crate::structure::Law;
 use crate::threads::{analyses_at_once, map};
 use nalgebra::{DMatrix, DVector};
 
@@ -43,7 +43,7 @@ const SAMPLES_PER_PARAMETER: usize = 4;
 
 /// A candidate for what the model lacks.
 enum Candidate {
-    Term(CoefficientKind, Term),
+    Term(CoefficientKind, Law),
     Record(RecordParameter),
 }
 
@@ -70,7 +70,7 @@ impl Candidate {
 pub(super) struct ScoreTests<'a> {
     problem: &'a Problem,
     evaluation: &'a Evaluation,
-    kinds: Vec<(CoefficientKind, Term)>,
+    kinds: Vec<(CoefficientKind, Law)>,
     records: Vec<RecordParameter>,
     model: Span,
     /// Derivatives in the coefficients of the terms.
@@ -231,7 +231,7 @@ fn refit(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> Option<Refi
 }
 
 /// Kinds and terms that the model does not have.
-fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKind, Term)> {
+fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKind, Law)> {
     let speeds: Vec<f64> = (evaluation.trajectories.iter())
         .flat_map(|response| response.velocity.iter().copied())
         .collect();
@@ -251,8 +251,8 @@ fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKin
 /// Constants for the terms of `kinds`.
 fn constants(
     problem: &Problem,
-    kinds: &[(CoefficientKind, Term)],
-) -> Vec<(CoefficientFunction, Term)> {
+    kinds: &[(CoefficientKind, Law)],
+) -> Vec<(CoefficientFunction, Law)> {
     let nodes = problem.functions.nodes();
     let each = kinds.iter();
     each.map(|(kind, term)| (CoefficientFunction::constant(*kind, 0.0, nodes), *term))
@@ -260,7 +260,7 @@ fn constants(
 }
 
 /// Root mean square of `phi` of a term over all records.
-fn force(evaluation: &Evaluation, term: Term) -> f64 {
+fn force(evaluation: &Evaluation, term: Law) -> f64 {
     let of = |response: &Trajectory| -> Vec<f64> {
         let states = response.displacement.iter().zip(&response.velocity);
         states.map(|(y, v)| term.phi(*y, *v)).collect()

@@ -3,8 +3,8 @@
 use crate::diagnostics::rms;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
 use crate::solvers::number_or_nan;
+use crate::step::SimulationError;
 use serde::{Deserialize, Serialize};
 
 /// Result of the step-size check.

@@ -118,12 +118,6 @@ impl CoefficientSpec {
         self
     }
 
-    /// Fixed, one value per node.
-    pub fn fixed_at_nodes(values: Vec<f64>) -> Self {
-        let name = "values at the nodes".to_owned();
-        Self::known(TimeHistory::Nodal { name, values })
-    }
-
     /// Estimated in a basis.
     pub fn estimated(basis: BasisSpec, start: Start) -> Self {
         Self::new(CoefficientForm::Estimated(basis, start))

@@ -4,7 +4,7 @@ use super::BuildError;
 use crate::functions::CoefficientKind;
 use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment};
-use crate::system::Term;
+use crate::structure::Law;
 
 /// Error for gains that cannot be estimated. In a linear system, a free response and its initial state, or a forced response
 /// and the inverse scale of mass, damping and stiffness, can be multiplied by a factor that the gain divides.
@@ -16,9 +16,9 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     let mut functions = problem.functions.iter();
     let has_stiffness =
         functions.any(|f| f.quantity == CoefficientKind::Stiffness && f.parameters() > 0);
-    let shift_is_free = |t: &Term| match t {
-        Term::QuadraticStiffness => has_stiffness,
-        Term::Offset => true,
+    let shift_is_free = |t: &Law| match t {
+        Law::QuadraticStiffness => has_stiffness,
+        Law::Offset => true,
         term => term.is_linear(),
     };
     if terms.iter().all(shift_is_free) {

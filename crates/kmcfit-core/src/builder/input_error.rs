@@ -4,7 +4,7 @@ use super::BuildError;
 use super::record::{ChannelSpec, Record};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{BaseMotion, Input, InputError, Loss, NoiseModel, Waveform, Weighting};
-use crate::signal::{Interpolation, Signal};
+use crate::signal::Signal;
 use crate::solvers::Solver;
 use crate::system::InputQuantity;
 
@@ -35,12 +35,6 @@ impl Record {
                     .expected(format!("`columns: {{{name}: …}}`, or no sigma of it")),
             );
         };
-        if signal.interpolation() != Interpolation::Linear {
-            let problem = "errors of an input need an input that is linear between its samples";
-            return Err(BuildError::new(key, problem)
-                .found("another interpolation")
-                .expected("`interpolation: linear`, or no sigma of the input"));
-        }
         match self.channels.as_slice() {
             [channel] => check_channel(channel, key)?,
             channels => {
@@ -52,6 +46,7 @@ impl Record {
         }
         Ok(Some(InputError {
             times: signal.times().to_vec(),
+            interpolation: signal.interpolation(),
             ..stated.clone()
         }))
     }

@@ -8,7 +8,8 @@ use crate::functions::Parameterization;
 use crate::problem::Problem;
 use crate::signal::even_spacing;
 use crate::solvers::{Measurements, estimate_states};
-use crate::system::{Grid, System, Term};
+use crate::structure::Law;
+use crate::system::{Grid, System};
 use std::sync::Arc;
 
 /// Largest number of nodes, a safeguard against mistyped numbers.
@@ -164,7 +165,7 @@ impl Builder {
     }
 
     /// Force terms of the system.
-    fn terms(&self) -> Result<Vec<Term>, BuildError> {
+    fn terms(&self) -> Result<Vec<Law>, BuildError> {
         let mut terms = Vec::new();
         let is_term = |entry: &&FunctionEntry| entry.owner.is_none() && !entry.is_known_part;
         for entry in self.entries().iter().filter(is_term) {

@@ -280,6 +280,7 @@ impl Record {
             sigma,
             // Those of the input, when it is known.
             times: Vec::new(),
+            interpolation: Interpolation::Linear,
         });
         self
     }

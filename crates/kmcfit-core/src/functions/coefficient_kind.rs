@@ -1,6 +1,6 @@
 //! Kinds of coefficient functions, with names and units.
 
-use crate::system::Term;
+use crate::structure::Law;
 
 /// Kind of a coefficient function of the equation of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -141,19 +141,19 @@ impl CoefficientKind {
     ];
 
     /// Force term multiplied by this function; `None` for the mass. `friction_width` is the width of Coulomb friction, m/s.
-    pub fn term(self, friction_width: f64) -> Option<Term> {
+    pub fn term(self, friction_width: f64) -> Option<Law> {
         match self {
             CoefficientKind::Mass => None,
-            CoefficientKind::Damping => Some(Term::Damping),
-            CoefficientKind::Stiffness => Some(Term::Stiffness),
-            CoefficientKind::QuadraticStiffness => Some(Term::QuadraticStiffness),
-            CoefficientKind::CubicStiffness => Some(Term::CubicStiffness),
-            CoefficientKind::QuinticStiffness => Some(Term::QuinticStiffness),
-            CoefficientKind::QuadraticDamping => Some(Term::QuadraticDamping),
-            CoefficientKind::CoulombFriction => Some(Term::CoulombFriction {
+            CoefficientKind::Damping => Some(Law::Damping),
+            CoefficientKind::Stiffness => Some(Law::Stiffness),
+            CoefficientKind::QuadraticStiffness => Some(Law::QuadraticStiffness),
+            CoefficientKind::CubicStiffness => Some(Law::CubicStiffness),
+            CoefficientKind::QuinticStiffness => Some(Law::QuinticStiffness),
+            CoefficientKind::QuadraticDamping => Some(Law::QuadraticDamping),
+            CoefficientKind::CoulombFriction => Some(Law::CoulombFriction {
                 width: friction_width,
             }),
-            CoefficientKind::Offset => Some(Term::Offset),
+            CoefficientKind::Offset => Some(Law::Offset),
         }
     }
 }

@@ -230,18 +230,11 @@ impl Parameterization {
             .collect()
     }
 
-    /// The parameterization with another start.
+    /// Sets the start.
     ///
     /// # Panics
     /// If `theta` has a wrong number of parameters.
-    #[must_use]
-    pub fn with_start(mut self, theta: &[f64]) -> Self {
-        self.set_start(theta);
-        self
-    }
-
-    /// Sets the start.
-    pub(crate) fn set_start(&mut self, theta: &[f64]) {
+    pub fn set_start(&mut self, theta: &[f64]) {
         assert_eq!(theta.len(), self.parameters(), "one start per parameter");
         for (function, range) in self.list.iter_mut().zip(&self.ranges) {
             function.start.copy_from_slice(&theta[range.clone()]);

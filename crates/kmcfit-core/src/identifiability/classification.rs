@@ -7,7 +7,7 @@ use crate::number_format::at_most;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::spans::{span_words, spans};
-use crate::system::Term;
+use crate::structure::Law;
 use serde::{Deserialize, Serialize};
 
 /// Largest half-width of the 95 % band of an identified function, as a share of its size ([`Problem::natural_scales`] with
@@ -208,14 +208,14 @@ fn of_functions<'a>(
     let terms = problem.system.terms.clone();
     let functions = problem.functions.ranges().len();
     let is_chosen = move |index: usize, name: &str| {
-        let of = |term: Term| {
+        let of = |term: Law| {
             let place = terms.iter().position(|t| *t == term);
             place.map(|place| assembly[place + 1])
         };
         let numerator = match name {
             _ if index < functions => Some(index),
-            "k/m" => of(Term::Stiffness),
-            _ => of(Term::Damping),
+            "k/m" => of(Law::Stiffness),
+            _ => of(Law::Damping),
         };
         let mass = (index >= functions).then_some(assembly[0]);
         let mut all = numerator.into_iter().chain(mass);
@@ -293,11 +293,11 @@ pub fn classify_functions(
     let sizes = problem.median_scales(evaluation);
     let assembly = problem.functions.coefficient_set(0);
     let mass = median_size(&evaluation.nodal.mass);
-    let of = |term: Term| {
+    let of = |term: Law| {
         let place = problem.system.terms.iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
     };
-    let named = [("k/m", of(Term::Stiffness)), ("c/m", of(Term::Damping))];
+    let named = [("k/m", of(Law::Stiffness)), ("c/m", of(Law::Damping))];
     let ratios: Vec<(&str, usize, f64, Classification)> = (named.into_iter())
         .filter_map(|(name, function)| {
             let (band, f) = (bands.ratio(name)?, function?);

@@ -8,7 +8,9 @@
 //! ```
 //!
 //! with the kernel covariance `S` of the scores ([`KernelCovariance`]): no assumption is made on the variance and the correlation of the
-//! residuals. Where a misfit makes the estimates depend on the width of the bump functions, their change is a further root of the covariance. It **excludes** the bias by errors of the rows, which contain the measured response.
+//! residuals. Where a misfit makes the estimates of constants depend on the width of the bump functions, their change is a further root of the
+//! covariance, and for functions of time the common shrinkage by the errors of the rows, which contain the measured response, where a force
+//! gives the scale. It **excludes** what else these errors change.
 
 use super::active::ActiveRow;
 use super::columns::with_column;
@@ -26,7 +28,8 @@ pub struct EquationRows {
     pub residuals: Vec<f64>,
     /// Rows of each record, in time order.
     pub records: Vec<Range<usize>>,
-    /// Change of each row by that of the estimates with the width of the bump functions, where a misfit makes them depend on it.
+    /// Change of each row by one of the estimates that the scores do not show: of constants with the width of the bump functions, where a
+    /// misfit makes them depend on it; of functions of time by the errors of the rows.
     pub change: Option<DVector<f64>>,
     /// Linear forms of the parameters held besides the constraints, as columns and coefficients: nuisance parameters, and the mean of the
     /// mass where the common scale of the functions is undetermined.

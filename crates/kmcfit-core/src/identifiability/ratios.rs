@@ -1,7 +1,7 @@
 //! Ratios of coefficients at one time, with their derivatives for the delta method.
 
 use crate::problem::Problem;
-use crate::system::Term;
+use crate::structure::Law;
 use std::f64::consts::TAU;
 
 /// A ratio of the shared coefficient set.
@@ -23,11 +23,11 @@ pub fn ratios_of_set(problem: &Problem) -> Vec<RatioOfSet> {
         let parts = set.parts().filter(|(other, _)| *other == place);
         parts.map(|(_, f)| f).collect()
     };
-    let of = |term: Term| {
+    let of = |term: Law| {
         let place = terms.iter().position(|t| *t == term)?;
         Some(at_place(place + 1))
     };
-    let (m, damping, stiffness) = (at_place(0), of(Term::Damping), of(Term::Stiffness));
+    let (m, damping, stiffness) = (at_place(0), of(Law::Damping), of(Law::Stiffness));
     let of_set = |name, unit, coefficients: &[&Vec<usize>], ratio| RatioOfSet {
         name,
         unit,

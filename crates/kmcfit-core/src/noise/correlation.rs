@@ -3,7 +3,7 @@
 use super::autoregression::Autoregression;
 use super::input_errors::InputErrors;
 use crate::signal::median;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub enum CorrelationLaw {
 pub struct Correlation {
     law: CorrelationLaw,
     /// Times of the samples, s.
-    times: Vec<f64>,
+    times: Arc<[f64]>,
     /// Runs of equally spaced samples without a gap; one run for the exponential law.
     runs: Vec<Range<usize>>,
     /// Predictors of samples that an ordinary predictor does not reach, in the order of the samples: of all but the first
@@ -78,9 +78,9 @@ pub fn uninterrupted_runs(times: &[f64]) -> Option<Vec<Range<usize>>> {
 impl Correlation {
     /// Correlation under `law` of samples at `times`.
     ///
-    /// After a gap of equally spaced samples each of the first `p` is predicted from the last `2 p + 1` samples before it, which is
-    /// exact for `p = 1` and neglects what earlier samples add otherwise (Vecchia 1988). An autoregressive law of samples that are
-    /// not equally spaced gives `None`.
+    /// After a gap of equally spaced samples each of the first `p` is predicted from the last `2 p + 1` samples before the gap and
+    /// those since, which is exact for `p = 1` and neglects what earlier samples add otherwise (Vecchia 1988). An autoregressive law of
+    /// samples that are not equally spaced gives `None`.
     pub fn new(law: CorrelationLaw, times: &[f64]) -> Option<Self> {
         let (runs, predictors) = match &law {
             CorrelationLaw::Autoregressive(process) => {
@@ -89,15 +89,7 @@ impl Correlation {
                 (runs, predictors)
             }
             CorrelationLaw::Exponential { time } => {
-                let later = times.windows(2).enumerate().map(|(i, pair)| {
-                    let link = (-(pair[1] - pair[0]) / time).exp();
-                    Predictor {
-                        sample: i + 1,
-                        coefficients: vec![link],
-                        variance: (1.0 - link) * (1.0 + link),
-                    }
-                });
-                (std::iter::once(0..times.len()).collect(), later.collect())
+                return Some(Self::exponential(*time, times.into()));
             }
             CorrelationLaw::InputErrors(_) => {
                 (std::iter::once(0..times.len()).collect(), Vec::new())
@@ -105,10 +97,27 @@ impl Correlation {
         };
         Some(Self {
             law,
-            times: times.to_vec(),
+            times: times.into(),
             runs,
             predictors,
         })
+    }
+
+    fn exponential(time: f64, times: Arc<[f64]>) -> Self {
+        let later = times.windows(2).enumerate().map(|(i, pair)| {
+            let link = (-(pair[1] - pair[0]) / time).exp();
+            Predictor {
+                sample: i + 1,
+                coefficients: vec![link],
+                variance: (1.0 - link) * (1.0 + link),
+            }
+        });
+        Self {
+            law: CorrelationLaw::Exponential { time },
+            runs: std::iter::once(0..times.len()).collect(),
+            predictors: later.collect(),
+            times,
+        }
     }
 
     /// Law of the correlation.
@@ -146,22 +155,27 @@ impl Correlation {
     /// The correlation of the same samples at other coordinates of the law.
     #[must_use]
     pub fn at(&self, coordinates: &[f64]) -> Self {
-        let law = match &self.law {
+        match &self.law {
             CorrelationLaw::Autoregressive(_) => {
-                CorrelationLaw::Autoregressive(Autoregression::from_coordinates(coordinates))
+                let process = Autoregression::from_coordinates(coordinates);
+                Self {
+                    predictors: predictors_after_gaps(&process, &self.runs, &self.times),
+                    law: CorrelationLaw::Autoregressive(process),
+                    times: Arc::clone(&self.times),
+                    runs: self.runs.clone(),
+                }
             }
-            CorrelationLaw::Exponential { .. } => CorrelationLaw::Exponential {
-                time: coordinates.iter().sum::<f64>().exp(),
-            },
-            CorrelationLaw::InputErrors(_) => return self.clone(),
-        };
-        // The samples are equally spaced as before.
-        Self::new(law, &self.times).unwrap_or_else(|| self.clone())
+            CorrelationLaw::Exponential { .. } => {
+                let time = coordinates.iter().sum::<f64>().exp();
+                Self::exponential(time, Arc::clone(&self.times))
+            }
+            CorrelationLaw::InputErrors(_) => self.clone(),
+        }
     }
 
-    /// True for equally spaced samples without a gap, under an autoregressive law.
-    pub fn is_uninterrupted(&self) -> bool {
-        matches!(self.law, CorrelationLaw::Autoregressive(_)) && self.runs.len() == 1
+    /// Runs without a gap, under an autoregressive law: there the predictor of a sample from the `p` before it is always the same.
+    pub fn autoregressive_runs(&self) -> Option<&[Range<usize>]> {
+        matches!(self.law, CorrelationLaw::Autoregressive(_)).then_some(&self.runs)
     }
 
     /// Correlation of the first `count` samples.
@@ -177,7 +191,7 @@ impl Correlation {
         };
         Self {
             law,
-            times: self.times[..count.min(self.times.len())].to_vec(),
+            times: self.times[..count.min(self.times.len())].into(),
             runs: runs.map(|run| run.start..run.end.min(count)).collect(),
             predictors: predictors.cloned().collect(),
         }
@@ -252,9 +266,23 @@ impl Correlation {
             }
             return;
         }
+        self.rows_of(|run| run.clone(), take);
+    }
+
+    /// As [`Self::each_row`], of the first `p` samples of each run.
+    pub fn each_first_row(&self, take: impl FnMut(usize, &[f64], f64)) {
+        let order = self.order();
+        self.rows_of(|run| run.start..run.end.min(run.start + order), take);
+    }
+
+    fn rows_of(
+        &self,
+        part: impl Fn(&Range<usize>) -> Range<usize>,
+        mut take: impl FnMut(usize, &[f64], f64),
+    ) {
         let mut special = self.predictors.iter().peekable();
         for run in &self.runs {
-            for i in run.clone() {
+            for i in part(run) {
                 let (coefficients, variance) = match (special.peek(), &self.law) {
                     (Some(own), _) if own.sample == i => (&own.coefficients[..], own.variance),
                     (_, CorrelationLaw::Autoregressive(process)) => {
@@ -269,48 +297,62 @@ impl Correlation {
     }
 }
 
-/// Predictors of the first samples after each gap.
+/// Predictors of the first `p` samples after each gap from the last `2 p + 1` before it and those since: one factorisation a gap.
 fn predictors_after_gaps(
     process: &Autoregression,
     runs: &[Range<usize>],
     times: &[f64],
 ) -> Vec<Predictor> {
+    if runs.len() < 2 {
+        return Vec::new();
+    }
     let order = process.order();
     let spacing = runs.iter().find(|run| run.len() > 1);
     let Some(spacing) = spacing.map(|run| times[run.start + 1] - times[run.start]) else {
         return Vec::new();
     };
-    let reach = 2 * order + 1;
     let lags = process.autocorrelation(LONGEST_GAP);
     let mut predictors = Vec::new();
     // Many gaps are alike: single samples left out.
-    let mut known: BTreeMap<Vec<usize>, Option<(Vec<f64>, f64)>> = BTreeMap::new();
+    let mut known: BTreeMap<Vec<usize>, Vec<(Vec<f64>, f64)>> = BTreeMap::new();
     for pair in runs.windows(2) {
         let run = &pair[1];
-        for sample in run.start..run.end.min(run.start + order) {
-            let place = |i: usize| ((times[sample] - times[i]) / spacing).round() as usize;
-            let before = (0..sample).rev().take(reach);
-            let before: Vec<usize> = before.map(place).take_while(|p| *p < lags.len()).collect();
-            let found = known.entry(before);
-            let found = found.or_insert_with_key(|before| predictor(before, &lags));
-            predictors.extend(found.clone().map(|(coefficients, variance)| Predictor {
-                sample,
-                coefficients,
-                variance,
-            }));
-        }
+        let last = run.end.min(run.start + order) - 1;
+        let place = |i: usize| ((times[last] - times[i]) / spacing).round() as usize;
+        let near = (run.start.saturating_sub(2 * order + 1)..=last).map(place);
+        let near: Vec<usize> = near.skip_while(|place| *place >= lags.len()).collect();
+        let after = last + 1 - run.start;
+        let found = known.entry(near);
+        let found = found.or_insert_with_key(|near| last_predictors(near, after, &lags));
+        let samples = (run.start..).zip(found.clone());
+        predictors.extend(samples.map(|(sample, (coefficients, variance))| Predictor {
+            sample,
+            coefficients,
+            variance,
+        }));
     }
     predictors
 }
 
-/// Coefficients of the best linear predictor of a sample from those at the distances `before`, in spacings, and the variance of its error.
-fn predictor(before: &[usize], lags: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let count = before.len();
-    let matrix = DMatrix::from_fn(count, count, |i, j| lags[before[i].abs_diff(before[j])]);
-    let right = DVector::from_fn(count, |i, _| lags[before[i]]);
-    let coefficients = matrix.cholesky()?.solve(&right);
-    let variance = 1.0 - coefficients.dot(&right);
-    (variance > 0.0).then(|| (coefficients.as_slice().to_vec(), variance))
+/// Best linear predictors of each of the last `count` samples at `places`, in spacings before the last one, from all before it:
+/// coefficients, the nearest sample first, and the variance of the error. Row `m` of the Cholesky factor `L` of the correlations
+/// holds both: `L_m^T c = l_m` with its part `l_m` left of the diagonal, variance `L_mm^2`.
+fn last_predictors(places: &[usize], count: usize, lags: &[f64]) -> Vec<(Vec<f64>, f64)> {
+    let n = places.len();
+    let matrix = DMatrix::from_fn(n, n, |i, j| lags[places[i].abs_diff(places[j])]);
+    let Some(factor) = matrix.cholesky() else {
+        return Vec::new();
+    };
+    let lower = factor.l_dirty();
+    let predictor = |m: usize| {
+        let mut coefficients = lower.view((m, 0), (1, m)).transpose();
+        let earlier = lower.view((0, 0), (m, m));
+        let solved = earlier.tr_solve_lower_triangular_mut(&mut coefficients);
+        debug_assert!(solved, "a Cholesky factor has a positive diagonal");
+        let coefficients = coefficients.iter().rev().copied().collect();
+        (coefficients, lower[(m, m)].powi(2))
+    };
+    (n - count..n).map(predictor).collect()
 }
 
 #[cfg(test)]

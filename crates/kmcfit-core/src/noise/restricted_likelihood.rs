@@ -18,6 +18,7 @@ use super::correlation::Correlation;
 use super::penalty_moments::PenaltyMoments;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Step of central differences in the coordinates.
 pub const STEP: f64 = 1e-3;
@@ -61,12 +62,13 @@ enum Products {
     Autoregressive {
         /// `sum_i x_(i-k) x_(i-l)^T` over the rows with `p` rows of their run before them, for `0 <= k, l <= p`.
         lags: Vec<Vec<DMatrix<f64>>>,
-        /// First `p` rows.
-        head: DMatrix<f64>,
-        /// Number of the other rows.
-        rest: usize,
+        /// Number of these rows.
+        usual: usize,
+        /// The rows up to the last of the others, which are whitened anew at each point.
+        rows: DMatrix<f64>,
+        correlation: Correlation,
     },
-    /// Rows to be whitened anew at each point: with gaps, or at irregular times.
+    /// Rows to be whitened anew at each point.
     Rows(DMatrix<f64>, Correlation),
 }
 
@@ -80,10 +82,10 @@ impl ChannelMoments {
     ) -> Self {
         let products = match correlation {
             None => Products::White(rows.tr_mul(rows)),
-            Some(correlation) if correlation.is_uninterrupted() => {
-                autoregressive(rows, correlation.order())
-            }
-            Some(correlation) => Products::Rows(rows.clone(), correlation.clone()),
+            Some(correlation) => match correlation.autoregressive_runs() {
+                Some(runs) => autoregressive(rows, correlation, runs),
+                None => Products::Rows(rows.clone(), correlation.clone()),
+            },
         };
         let correlation_parameters = correlation.map_or(Vec::new(), Correlation::coordinates);
         let sigma = estimates_sigma.then_some(0.0);
@@ -107,48 +109,70 @@ impl ChannelMoments {
                 }
                 (whitened.tr_mul(&whitened), correlation.log_determinant())
             }
-            Products::Autoregressive { lags, head, rest } => {
+            Products::Autoregressive {
+                lags,
+                usual,
+                rows,
+                correlation,
+            } => {
+                let correlation = correlation.at(correlation_parameters);
                 let process = Autoregression::from_coordinates(correlation_parameters);
                 let variance = process.innovation_variance();
                 let minus = process.coefficients().iter().map(|a| -a);
                 let filter: Vec<f64> = std::iter::once(1.0).chain(minus).collect();
-                let mut gram = DMatrix::zeros(lags[0][0].nrows(), lags[0][0].nrows());
+                let mut gram = DMatrix::zeros(rows.ncols(), rows.ncols());
                 for (k, a) in filter.iter().enumerate() {
                     for (l, b) in filter.iter().enumerate() {
                         gram += &lags[k][l] * (a * b / variance);
                     }
                 }
-                let mut determinant = *rest as f64 * variance.ln();
-                for i in 0..head.nrows() {
-                    let (coefficients, variance) = process.predictor(i);
-                    let mut row = head.row(i).into_owned();
-                    for (j, a) in coefficients.iter().enumerate() {
-                        row -= head.row(i - 1 - j) * *a;
-                    }
-                    gram += row.transpose() * &row / variance;
-                    determinant += variance.ln();
-                }
-                (gram, determinant)
+                let mut determinant = *usual as f64 * variance.ln();
+                let mut others = Vec::new();
+                correlation.each_first_row(|i, coefficients, size| {
+                    others.extend(rows.column_iter().map(|column| {
+                        let earlier = column.as_slice()[..i].iter().rev();
+                        let predicted: f64 = earlier.zip(coefficients).map(|(u, a)| a * u).sum();
+                        size * (column[i] - predicted)
+                    }));
+                    determinant -= 2.0 * size.ln();
+                });
+                let count = others.len() / rows.ncols();
+                let others = DMatrix::from_vec(rows.ncols(), count, others);
+                (gram + &others * others.transpose(), determinant)
             }
         }
     }
 }
 
-/// Products of uninterrupted rows at all lags up to the order.
-fn autoregressive(rows: &DMatrix<f64>, order: usize) -> Products {
-    let rest = rows.nrows().saturating_sub(order);
-    let at = |lag: usize| rows.rows(order - lag, rest);
+/// Products of the rows of `runs` without a gap at all lags up to the order.
+fn autoregressive(
+    rows: &DMatrix<f64>,
+    correlation: &Correlation,
+    runs: &[Range<usize>],
+) -> Products {
+    let order = correlation.order();
+    let usual = |run: &Range<usize>| run.len().saturating_sub(order);
+    let needed = (runs.last()).map_or(0, |run| run.end.min(run.start + order));
+    let product = |k: usize, l: usize| {
+        let runs = runs.iter().filter(|run| usual(run) > 0);
+        let zero = DMatrix::zeros(rows.ncols(), rows.ncols());
+        runs.fold(zero, |sum, run| {
+            let at = |lag: usize| rows.rows(run.start + order - lag, usual(run));
+            sum + at(k).tr_mul(&at(l))
+        })
+    };
     let mut lags: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(order + 1);
     for k in 0..=order {
         let known = lags.iter().map(|row| row[k].transpose());
         let known: Vec<DMatrix<f64>> = known.collect();
-        let further = (k..=order).map(|l| at(k).tr_mul(&at(l)));
+        let further = (k..=order).map(|l| product(k, l));
         lags.push(known.into_iter().chain(further).collect());
     }
     Products::Autoregressive {
         lags,
-        head: rows.rows(0, rows.nrows() - rest).into_owned(),
-        rest,
+        usual: runs.iter().map(usual).sum(),
+        rows: rows.rows(0, needed).into_owned(),
+        correlation: correlation.clone(),
     }
 }
 

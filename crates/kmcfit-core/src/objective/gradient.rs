@@ -3,7 +3,7 @@
 use super::Evaluation;
 use crate::functions::{CoefficientFunction, Design};
 use crate::problem::Problem;
-use crate::simulate::{CoefficientGradient, Engine, Trajectory, continuous_adjoint};
+use crate::step::{CoefficientGradient, Trajectory, continuous_adjoint};
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, State};
 
@@ -207,10 +207,9 @@ impl Problem {
         let (experiment, functions) = (&self.experiments[e], &self.functions);
         let assembly = functions.coefficient_set(experiment.coefficient_set);
         let view = self.view(evaluation, e);
-        if view.engine() != Engine::Prefactored
-            || !assembly
-                .parts()
-                .all(|(_, f)| functions.is_constant_or_known(f))
+        if !assembly
+            .parts()
+            .all(|(_, f)| functions.is_constant_or_known(f))
         {
             return false;
         }
@@ -223,16 +222,9 @@ impl Problem {
             &mut CoefficientGradient::Summed(&mut direct),
             &mut own,
         );
-        let found = view.engine().discrete_adjoint_sums(
-            view.system,
-            view.nodal,
-            view.excitation,
-            view.response,
-            &source,
-        );
-        let Some((sums, initial)) = found else {
-            return false;
-        };
+        let mut sums = vec![0.0; assembly.len()];
+        let by_sums = CoefficientGradient::Summed(&mut sums);
+        let initial = view.driven().adjoint(view.response, &source, by_sums);
         for (place, f) in assembly.parts() {
             let first = functions.ranges()[f].start;
             for (j, entry) in functions.get(f).design.row(0) {

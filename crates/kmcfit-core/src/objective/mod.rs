@@ -2,8 +2,6 @@
 
 mod cost_and_gradient;
 mod gradient;
-mod gradient_check;
-mod gradient_error;
 mod jacobian;
 mod node_aligned;
 mod prediction;
@@ -13,8 +11,6 @@ mod simulated_record;
 mod step_halving;
 
 pub use gradient::{Gradient, GradientKind};
-pub use gradient_check::GradientCheck;
-pub use gradient_error::GradientError;
 pub use residual_diagnostics::{all_diagnostics, channel_fit_percent, diagnostics, outliers};
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
@@ -22,8 +18,7 @@ pub use step_halving::Refined;
 
 use crate::problem::Problem;
 use crate::record::Channel;
-use crate::simulate::reference::tangent;
-use crate::simulate::{Cause, Engine, EngineMode, SimulationError, Trajectory};
+use crate::step::{Cause, Driven, EngineMode, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 
 /// Cost at one point, with the simulation it was computed from.
@@ -105,7 +100,7 @@ impl Problem {
         self.evaluate_for(EngineMode::Fastest, theta, evaluation)
     }
 
-    /// [`Problem::evaluate_into`] with the engine for a [`EngineMode`].
+    /// [`Problem::evaluate_into`] in an [`EngineMode`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
@@ -156,8 +151,12 @@ impl Problem {
             let response = &mut evaluation.trajectories[e];
             let initial = experiment.initial_state(&evaluation.scalars);
             let (system, excitation) = (&self.system, experiment.excitation.as_ref());
-            let engine = Engine::choose(system, excitation, response.nodes(), mode);
-            engine.forward_into(system, nodal, initial, excitation, response)?;
+            let driven = Driven {
+                system,
+                nodal,
+                excitation,
+            };
+            driven.respond(mode, initial, response)?;
             let view = SimulatedRecord {
                 system,
                 nodal,
@@ -206,8 +205,7 @@ impl Problem {
                     velocity: change(experiment.initial_parameters[1]),
                 },
             };
-            let (nodal, excitation) = (view.nodal, view.excitation);
-            let response = tangent(view.system, nodal, excitation, view.response, &direction);
+            let response = view.driven().tangent(view.response, &direction);
             let along = RecordTangent {
                 nodal: &direction.nodal,
                 response: &response,

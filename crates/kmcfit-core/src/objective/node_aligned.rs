@@ -3,9 +3,9 @@
 use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
 use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
-use crate::simulate::fast::lane_reads;
-use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
-use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::step::eight;
+use crate::step::nodal_observations::{Accelerations, NodalObservations};
+use crate::step::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
@@ -25,7 +25,7 @@ impl Channel {
         if let Some(inputs) = self.inputs_at_samples() {
             return [0, 1].map(|part| match inputs[part].as_slice() {
                 [] => Eight::splat(arithmetic, 0.0),
-                values => lane_reads::eight(arithmetic, values, i),
+                values => eight(arithmetic, values, i),
             });
         }
         let mut rows = [[0.0; LANES]; 2];
@@ -80,7 +80,7 @@ impl Kernel for Predict<'_> {
             channel.accelerations(arithmetic, view, from, &mut observed);
             let mut value = Eight::load(arithmetic, &observed.value);
             if !channel.base().is_empty() {
-                value += lane_reads::eight(arithmetic, channel.base(), from);
+                value += eight(arithmetic, channel.base(), from);
             }
             let mut row = (factor * value).row();
             if (offset, drift) != (0.0, 0.0) {

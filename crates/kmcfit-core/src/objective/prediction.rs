@@ -5,8 +5,8 @@ use super::{RecordTangent, SimulatedRecord};
 use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
 use crate::simd;
-use crate::simulate::reference::{Observation, observe, observe_value};
-use crate::simulate::{CoefficientGradient, Trajectory};
+use crate::step::{CoefficientGradient, Trajectory};
+use crate::step::{Observation, observe, observe_value};
 use crate::system::{InputSample, TimePoint};
 
 /// Share of a step by which a sample is moved for its derivative in time.

@@ -7,8 +7,8 @@ use crate::record::{ChannelKind, Experiment, LONG_RECORD_STEPS};
 use crate::signal::Spectrum;
 use crate::simd::LANES;
 use crate::simd::sum::largest;
-use crate::simulate::Trajectory;
-use crate::system::Term;
+use crate::step::Trajectory;
+use crate::structure::Law;
 use crate::system::quadrature::curvature_at;
 use std::f64::consts::TAU;
 
@@ -91,16 +91,16 @@ impl Problem {
 }
 
 /// Sums over the nodes of `y''^2` and of `phi^2` of each term.
-fn squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+fn squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
     let (y, v) = (&response.displacement, &response.velocity);
     let nodes = y.len();
     if nodes <= LONG_RECORD_STEPS {
         return sequential_squares(response, terms, step);
     }
     let inertia = sum_of_squares(nodes, |i| curvature_at(y, step, i));
-    let of = |term: &Term| match term {
-        Term::Damping => sum_of_squares(nodes, |i| v[i]),
-        Term::Stiffness => sum_of_squares(nodes, |i| y[i]),
+    let of = |term: &Law| match term {
+        Law::Damping => sum_of_squares(nodes, |i| v[i]),
+        Law::Stiffness => sum_of_squares(nodes, |i| y[i]),
         _ => sum_of_squares(nodes, |i| term.phi(y[i], v[i])),
     };
     let terms = terms.iter().map(of);
@@ -109,7 +109,7 @@ fn squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
 
 /// [`squares`] of a short record. Steepest descent depends on every bit, so sums are sequential; four columns are
 /// interleaved, because each sum is a chain of dependent operations.
-fn sequential_squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+fn sequential_squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
     const PART: usize = 256;
     let (y, v) = (&response.displacement, &response.velocity);
     let mut sums = vec![0.0; terms.len() + 1];
@@ -123,8 +123,8 @@ fn sequential_squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f
                 let each = values.iter_mut().zip(nodes.clone());
                 match column.checked_sub(1).map(|j| &terms[j]) {
                     None => each.for_each(|(x, i)| *x = curvature_at(y, step, i)),
-                    Some(Term::Damping) => values.copy_from_slice(&v[nodes.clone()]),
-                    Some(Term::Stiffness) => values.copy_from_slice(&y[nodes.clone()]),
+                    Some(Law::Damping) => values.copy_from_slice(&v[nodes.clone()]),
+                    Some(Law::Stiffness) => values.copy_from_slice(&y[nodes.clone()]),
                     Some(term) => each.for_each(|(x, i)| *x = term.phi(y[i], v[i])),
                 }
             }

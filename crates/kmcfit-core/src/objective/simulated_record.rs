@@ -1,6 +1,6 @@
 //! A simulated record with the system that produced it, and its directional derivative.
 
-use crate::simulate::{Engine, EngineMode, Trajectory};
+use crate::step::{Driven, Trajectory};
 use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 
 /// A simulated record.
@@ -29,22 +29,19 @@ pub struct RecordTangent<'a> {
     pub scalars: &'a [f64],
 }
 
-impl SimulatedRecord<'_> {
-    /// Engine of the response and its derivatives.
-    pub(crate) fn engine(&self) -> Engine {
-        let nodes = self.response.nodes();
-        Engine::choose(self.system, self.excitation, nodes, EngineMode::Fastest)
+impl<'a> SimulatedRecord<'a> {
+    /// The system with its functions and excitation.
+    pub(crate) fn driven(&self) -> Driven<'a> {
+        Driven {
+            system: self.system,
+            nodal: self.nodal,
+            excitation: self.excitation,
+        }
     }
 
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of the response.
+    /// Derivatives, with respect to the nodal values and the initial state, of a cost with the derivatives `source` with respect to the
+    /// response.
     pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
-        let Self {
-            system,
-            nodal,
-            excitation,
-            response,
-            ..
-        } = self;
-        (self.engine()).discrete_adjoint(system, nodal, *excitation, response, source)
+        self.driven().nodal_adjoint(self.response, source)
     }
 }

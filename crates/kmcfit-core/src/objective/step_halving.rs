@@ -2,7 +2,7 @@
 
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::simulate::{Engine, EngineMode, SimulationError, Trajectory};
+use crate::step::{Driven, EngineMode, SimulationError, Trajectory};
 use crate::system::{Grid, NodalCoefficients, State, System};
 use std::ops::Range;
 
@@ -101,9 +101,13 @@ impl Problem {
             let nodal = halved(nodal, steps);
             let excitation = part.excitation.as_ref();
             let mut response = Trajectory::zeros(part.nodes);
-            let engine = Engine::choose(&system, excitation, part.nodes, EngineMode::Fastest);
-            engine
-                .forward_into(&system, &nodal, state, excitation, &mut response)
+            let driven = Driven {
+                system: &system,
+                nodal: &nodal,
+                excitation,
+            };
+            driven
+                .respond(EngineMode::Fastest, state, &mut response)
                 .map_err(|error| SimulationError {
                     node: error.node + 2 * first,
                     ..error
@@ -150,7 +154,9 @@ mod tests {
     };
     use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Waveform, Weighting};
     use crate::signal::{Interpolation, Signal, low_pass};
-    use crate::system::{InputSample, Method, Term};
+    use crate::structure::Law;
+    use crate::system::InputSample;
+    use crate::system::Method;
 
     const NODES: usize = 101;
 
@@ -208,7 +214,7 @@ mod tests {
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: vec![Term::Damping, Term::Stiffness],
+            terms: vec![Law::Damping, Law::Stiffness],
         };
         Problem::new(system, functions, vec![record]).expect("a problem")
     }

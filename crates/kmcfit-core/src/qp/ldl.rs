@@ -124,18 +124,32 @@ impl Symmetric {
         total.iter_mut().zip(scale).for_each(|(t, s)| *t *= s);
     }
 
+    /// Refinement by conjugate residuals (Eisenstat, Elman and Schultz 1983): a few eigenvalues of the size of the regularisation take as many
+    /// steps, where plain refinement would gain little with each.
     fn refine(&self, factor: &mut QDLDLFactorisation<f64>, b: &[f64]) -> (Vec<f64>, f64) {
-        let size = |r: &[f64]| r.iter().fold(0.0f64, |m, r| m.max(r.abs()));
-        let reference = size(b).max(f64::MIN_POSITIVE);
-        let mut x = vec![0.0; b.len()];
-        let mut residual = b.to_vec();
-        let mut left = 1.0;
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let add = |to: &mut Vec<f64>, factor: f64, from: &[f64]| {
+            to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
+        };
+        let zeros = vec![0.0; b.len()];
+        let reference = dot(b, b).sqrt().max(f64::MIN_POSITIVE);
+        let (mut x, mut residual, mut left) = (zeros.clone(), b.to_vec(), 1.0);
+        // Steps and their images `-A d`, orthogonal to each other.
+        let mut known: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         for _ in 0..REFINEMENTS {
             let mut step = residual.clone();
             factor.solve(&mut step);
-            let trial: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + s).collect();
+            let mut image = self.residual(&step, &zeros);
+            for (other, of_other) in &known {
+                let share = -dot(&image, of_other) / dot(of_other, of_other);
+                add(&mut step, share, other);
+                add(&mut image, share, of_other);
+            }
+            let length = -dot(&residual, &image) / dot(&image, &image);
+            let mut trial = x.clone();
+            add(&mut trial, length, &step);
             let next = self.residual(&trial, b);
-            let size = size(&next) / reference;
+            let size = dot(&next, &next).sqrt() / reference;
             // False for NaN.
             if size < left {
                 (x, residual, left) = (trial, next, size);
@@ -145,6 +159,7 @@ impl Symmetric {
             if left <= RESIDUAL {
                 break;
             }
+            known.push((step, image));
         }
         (x, left)
     }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// The samples of one sensor.
 ///
 /// The model of sample `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`. Here `h_i` is displacement, velocity or
-/// acceleration of the response ([`observe`](crate::simulate::reference::observe())) at `t_i - delay`, `b_i` the same of the base for a
+/// acceleration of the response ([`observe`](crate::step::observe())) at `t_i - delay`, `b_i` the same of the base for a
 /// sensor of absolute motion, and `t_0` the time of the first sample. A filter, if any, is applied to model and samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {

@@ -102,9 +102,9 @@ impl Side {
     }
 }
 
-/// Indices of single samples far from the cubic through two neighbours on either side, at the times of a clock that may jitter: by eight robust standard deviations of such
-/// distances in the whole record and by 5.5 of those in the 40 samples around, and with the neighbours' own distances those of a single wrong sample,
-/// `-2/3` of its own. Impacts and steps of several samples have others.
+/// Indices of single samples far from the cubic through two neighbours on either side, at the times of a clock that may jitter: by eight
+/// robust standard deviations of such distances in the whole record and by 5.5 of those in the 40 samples around, and with the neighbours'
+/// own distances those of a single wrong sample, `-2/3` of its own. Impacts and steps of several samples have others.
 pub fn spikes(times: &[f64], values: &[f64]) -> Vec<usize> {
     let windows = times.windows(5).zip(values.windows(5));
     let distances: Vec<f64> = windows.map(|(t, x)| off_cubic(t, x)).collect();

@@ -7,6 +7,7 @@
 //! [`pulp`] proves the presence of instructions by its types, so no `unsafe` code is needed.
 
 mod portable;
+mod real;
 pub(crate) mod sum;
 pub(crate) mod tall_qr;
 #[cfg(target_arch = "x86_64")]
@@ -14,6 +15,8 @@ mod x86;
 
 #[cfg(test)]
 pub(crate) mod tests;
+
+pub use real::Real;
 
 use portable::Portable;
 use std::ffi::OsString;
@@ -59,6 +62,8 @@ pub(crate) trait Arithmetic: Copy {
     fn sub(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn mul(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn div(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
+    fn sqrt(self, a: Self::Registers) -> Self::Registers;
+    fn abs(self, a: Self::Registers) -> Self::Registers;
     /// Transposes eight rows.
     #[inline(always)]
     fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES] {
@@ -88,6 +93,30 @@ impl<A: Arithmetic> Eight<A> {
         Self {
             arithmetic,
             registers: arithmetic.load(row),
+        }
+    }
+
+    /// A constant, in the arithmetic of `self`.
+    #[inline(always)]
+    pub fn constant(self, x: f64) -> Self {
+        Self::splat(self.arithmetic, x)
+    }
+
+    /// Square roots.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Self {
+            registers: self.arithmetic.sqrt(self.registers),
+            ..self
+        }
+    }
+
+    /// Absolute values.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self {
+            registers: self.arithmetic.abs(self.registers),
+            ..self
         }
     }
 

@@ -38,6 +38,16 @@ impl Arithmetic for Portable {
         x
     }
 
+    #[inline(always)]
+    fn sqrt(self, a: Row) -> Row {
+        from_fn(|i| a[i].sqrt())
+    }
+
+    #[inline(always)]
+    fn abs(self, a: Row) -> Row {
+        from_fn(|i| a[i].abs())
+    }
+
     operators!(
         add | a,
         b | a + b,

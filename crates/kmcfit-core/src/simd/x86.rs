@@ -90,6 +90,16 @@ impl Arithmetic for Avx512 {
     operators!(at_once __m512d; add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd,
         div _mm512_div_pd);
 
+    #[inline(always)]
+    fn sqrt(self, a: __m512d) -> __m512d {
+        self.0.avx512f._mm512_sqrt_pd(a)
+    }
+
+    #[inline(always)]
+    fn abs(self, a: __m512d) -> __m512d {
+        self.0.avx512f._mm512_abs_pd(a)
+    }
+
     /// Transposes pairs within 128 bits, then 128-bit parts in two rounds.
     #[inline(always)]
     fn transpose(self, r: [__m512d; LANES]) -> [__m512d; LANES] {
@@ -167,6 +177,22 @@ impl Arithmetic for Avx2 {
 
     operators!(in_halves [__m256d; 2]; add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd,
         div _mm256_div_pd);
+
+    #[inline(always)]
+    fn sqrt(self, a: [__m256d; 2]) -> [__m256d; 2] {
+        let f = self.0.avx;
+        [f._mm256_sqrt_pd(a[0]), f._mm256_sqrt_pd(a[1])]
+    }
+
+    #[inline(always)]
+    fn abs(self, a: [__m256d; 2]) -> [__m256d; 2] {
+        let f = self.0.avx;
+        let sign = f._mm256_set1_pd(-0.0);
+        [
+            f._mm256_andnot_pd(sign, a[0]),
+            f._mm256_andnot_pd(sign, a[1]),
+        ]
+    }
 
     /// Transposes four 4 x 4 blocks and exchanges the two off the diagonal.
     #[inline(always)]

@@ -8,7 +8,7 @@ use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss};
-use crate::simulate::{EngineMode, SimulationError};
+use crate::step::{EngineMode, SimulationError};
 use std::sync::OnceLock;
 
 /// Evaluator of a problem with argmin's counters; the solvers evaluate through it alone.

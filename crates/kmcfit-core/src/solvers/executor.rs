@@ -15,7 +15,7 @@ use crate::host::Instant;
 use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use crate::record::Channel;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
 

@@ -10,7 +10,7 @@ use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::host::Instant;
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use std::time::Duration;
 
 /// Result of a fit: best point, history and outcome.

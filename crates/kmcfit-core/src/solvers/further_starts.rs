@@ -18,7 +18,7 @@ use crate::host::Instant;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Weighting};
 use crate::signal::median;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 
 /// Largest mean square of the residuals, in units of the stated sigma, of a fit at the noise.
 const LARGEST_MEAN_SQUARE: f64 = 1.1;

@@ -14,7 +14,7 @@ use crate::functions::Basis;
 use crate::number_format::significant;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use serde::Serialize;
 use std::fmt;
 

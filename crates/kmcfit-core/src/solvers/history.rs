@@ -3,7 +3,7 @@
 use super::iterate::Iterate;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment};
-use crate::simulate::Trajectory;
+use crate::step::Trajectory;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// One iteration: cost after it, gradient before it.

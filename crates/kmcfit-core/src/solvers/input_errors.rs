@@ -22,8 +22,7 @@ use crate::problem::Problem;
 use crate::record::{
     Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
 };
-use crate::simulate::SimulationError;
-use crate::simulate::reference::input_derivatives;
+use crate::step::SimulationError;
 use crate::system::{Grid, InputQuantity};
 use std::sync::Arc;
 
@@ -154,13 +153,7 @@ pub(crate) fn input_error_effect(
     error: &InputError,
 ) -> InputErrors {
     let view = problem.view(evaluation, e);
-    let derivatives = input_derivatives(
-        view.system,
-        view.nodal,
-        view.excitation,
-        view.response,
-        error.quantity,
-    );
+    let derivatives = (view.driven()).input_derivatives(view.response, error.quantity);
     let steps: Vec<InputStep> = derivatives
         .into_iter()
         .map(|[state, input]| InputStep { state, input })

@@ -73,7 +73,7 @@ pub use validation::predict_validation;
 pub use weight_choice::{choose_weight, choose_weight_watched};
 
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 
 impl Problem {
     /// Fits from the problem's start with default settings.

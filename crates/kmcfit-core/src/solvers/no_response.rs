@@ -10,7 +10,7 @@ use super::settings::FitSettings;
 use super::termination::{Outcome, Status};
 use crate::constraints::TOLERANCE;
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 
 /// Result of a fit whose starting points in the constraint set cannot be simulated, the first because of `breakdown`: status
 /// `infeasible`, with the start `given`, before projection onto the constraints, as the only point with a response.

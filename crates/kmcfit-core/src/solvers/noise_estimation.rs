@@ -19,7 +19,7 @@ use super::timings::Timings;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Loss, NoiseEstimate, Weighting};
 use crate::simd::sum::rms;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use nalgebra::DMatrix;
 
 /// Largest number of rounds of fit and estimation.

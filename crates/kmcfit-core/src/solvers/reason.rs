@@ -1,7 +1,7 @@
 //! Reasons for the end of a fit, and their sentences.
 
 use crate::qp::ConicStatus;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use thiserror::Error;

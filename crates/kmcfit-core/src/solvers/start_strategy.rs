@@ -20,7 +20,7 @@ use crate::host::Instant;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
 use crate::record::Channel;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use std::time::Duration;
 
 /// Misfit of a channel beyond the stated noise, as a share of its zero-response misfit, below which a fit explains the samples. Spurious minima leave per cents (a mass close to zero) to tens of per cent (a wrong period); a

@@ -7,7 +7,7 @@ use crate::functions::{CoefficientFunction, Parameterization, ScalarParameter};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Experiment;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 
 /// Predicts `experiment` with the functions of `evaluation`. Its initial state and sensor parameters, if unknown, are
 /// estimated from its own samples (`scalars`). Returns the problem of that experiment alone and the evaluated point.

@@ -10,7 +10,7 @@ use super::settings::FitSettings;
 use super::weight_path::choose_by_discrepancy;
 use crate::functions::WeightRule;
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 
 /// Fits `problem` along a path of factors on the penalties `which`, each fit started from its neighbour, and again at the
 /// factor chosen by `rule`. Returns the path, the problem at the chosen factor, and its fit. For the rule `bic`, `which` is the index

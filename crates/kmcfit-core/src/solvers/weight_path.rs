@@ -13,7 +13,7 @@ use super::timings::Timings;
 use super::traces::{SEED, Traces};
 use super::weight_rules::{discrepancy, gcv, l_curve, remark};
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use std::time::Duration;
 
 /// Largest weight of the path, relative to the zero-response misfit over a roughness of one.

@@ -12,7 +12,7 @@ use super::prediction::Z_95;
 use crate::functions::{CoefficientFunction, CoefficientSet, Parameterization, ScalarParameter};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment};
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use crate::system::{Grid, System};
 use nalgebra::{DMatrix, DVector};
 

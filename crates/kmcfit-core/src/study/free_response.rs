@@ -1,6 +1,6 @@
 //! Free responses of the identified system from given initial states, compared with those of the true system.
 
-use crate::simulate::{SimulationError, Trajectory};
+use crate::step::{SimulationError, Trajectory};
 use crate::system::quadrature::trapezoid;
 use crate::system::{NodalCoefficients, State, System};
 use serde::{Deserialize, Serialize};

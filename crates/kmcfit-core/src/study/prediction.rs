@@ -8,7 +8,7 @@ use super::extremes::Extreme;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
-use crate::simulate::{SimulationError, Trajectory};
+use crate::step::{SimulationError, Trajectory};
 use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 

@@ -9,18 +9,12 @@ pub struct State {
     pub velocity: f64,
 }
 
-impl State {
-    pub(crate) fn is_finite(self) -> bool {
-        self.displacement.is_finite() && self.velocity.is_finite()
-    }
-}
-
 /// Nodal values of the mass and of each term's coefficient function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalCoefficients {
     /// Mass at the nodes, kg.
     pub mass: Vec<f64>,
-    /// Nodal values of one coefficient function per [`Term`](super::Term), in the system's order. The coefficients of the last terms
+    /// Nodal values of one coefficient function per [`Law`](super::Law), in the system's order. The coefficients of the last terms
     /// are zero in derivatives if there are fewer functions than terms.
     pub coefficients: Vec<Vec<f64>>,
 }
@@ -62,11 +56,4 @@ pub struct SystemTangent {
     pub nodal: NodalCoefficients,
     /// Change of the initial state.
     pub initial: State,
-}
-
-impl SystemTangent {
-    pub(crate) fn is_finite(&self) -> bool {
-        let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
-        self.nodal.functions().all(finite) && self.initial.is_finite()
-    }
 }

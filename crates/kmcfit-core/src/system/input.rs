@@ -1,7 +1,6 @@
 //! Excitation of a system: force and base acceleration at the stages of the steps.
 
 use super::TimePoint;
-use super::integrator::StagePosition;
 use serde::Serialize;
 use std::ops::Range;
 use std::sync::Arc;
@@ -100,15 +99,6 @@ impl StageSamples {
         let [left, _, right] = self.stages();
         let last = right.last().copied();
         left[..self.steps()].iter().copied().chain(last).collect()
-    }
-
-    #[inline(always)]
-    pub(crate) fn at(&self, i: usize, position: StagePosition) -> f64 {
-        self.stages()[match position {
-            StagePosition::Left => 0,
-            StagePosition::Middle => 1,
-            StagePosition::Right => 2,
-        }][i]
     }
 }
 
@@ -292,12 +282,7 @@ mod tests {
             let nodes: Vec<f64> = nodes.chain(steps.last().map(|step| step[2])).collect();
             assert_eq!(samples.at_nodes(), nodes);
             for (i, step) in steps.iter().enumerate() {
-                let positions = [
-                    StagePosition::Left,
-                    StagePosition::Middle,
-                    StagePosition::Right,
-                ];
-                assert_eq!(positions.map(|position| samples.at(i, position)), *step);
+                assert_eq!(samples.step(i), *step);
             }
         }
     }

@@ -5,23 +5,21 @@
 //! mid-step uses the mean of two nodes.
 
 mod coefficients;
-mod elements;
 mod grid;
 mod input;
-mod integrator;
+mod method;
 pub mod quadrature;
 mod stability;
 
-pub(crate) use integrator::{MIDPOINT, RK4, StagePosition, Tableau};
-
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
-pub use elements::{MOST_TERMS, Term};
 pub use grid::{Grid, TimePoint, round_time};
 pub use input::{Excitation, InputQuantity, InputSample, StageSamples};
-pub use integrator::Method;
+pub use method::Method;
+
+use crate::structure::{Law, MOST_ELEMENTS};
 
 /// Largest number of functions of a system: the mass and one per term.
-pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
+pub(crate) const FUNCTIONS: usize = MOST_ELEMENTS + 1;
 
 /// Grid, integrator and force terms of a single-degree-of-freedom system; its coefficients are a [`NodalCoefficients`].
 #[derive(Debug, Clone, PartialEq)]
@@ -31,19 +29,19 @@ pub struct System {
     /// Integrator.
     pub method: Method,
     /// Force terms, in the order of [`NodalCoefficients::coefficients`].
-    pub terms: Vec<Term>,
+    pub terms: Vec<Law>,
 }
 
 impl System {
     /// Width of Coulomb friction, m/s; `None` without it.
     pub fn friction_width(&self) -> Option<f64> {
-        self.terms.iter().find_map(Term::friction_width)
+        self.terms.iter().find_map(Law::friction_width)
     }
 
     /// Sets the width of Coulomb friction, m/s.
     pub fn set_friction_width(&mut self, width: f64) {
         for term in &mut self.terms {
-            if let Term::CoulombFriction { width: of_term } = term {
+            if let Law::CoulombFriction { width: of_term } = term {
                 *of_term = width;
             }
         }

@@ -1,6 +1,6 @@
 //! Stability of explicit steps: the largest rate of the linear terms, and the number of nodes that it requires.
 
-use super::{Method, NodalCoefficients, System, Term};
+use super::{Law, Method, NodalCoefficients, System};
 
 impl Method {
     /// Largest product of step and rate, `h |lambda|`, of a stable step, with a margin of a tenth. Decay is stable up to
@@ -24,11 +24,11 @@ impl System {
 
     /// Largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s; nodes where it is not finite are omitted.
     fn largest_rate(&self, nodal: &NodalCoefficients) -> f64 {
-        let of = |wanted: Term| {
+        let of = |wanted: Law| {
             let index = self.terms.iter().position(|term| *term == wanted);
             index.and_then(|index| nodal.coefficients.get(index))
         };
-        let (damping, stiffness) = (of(Term::Damping), of(Term::Stiffness));
+        let (damping, stiffness) = (of(Law::Damping), of(Law::Stiffness));
         let value = |f: Option<&Vec<f64>>, i: usize| f.map_or(0.0, |f| f[i]);
         let rates = (nodal.mass.iter().enumerate())
             .map(|(i, m)| rate(*m, value(damping, i), value(stiffness, i)));
@@ -55,7 +55,7 @@ mod tests {
         System {
             grid: Grid::new(0.0, 2.0, 101).unwrap(),
             method,
-            terms: vec![Term::Damping, Term::Stiffness],
+            terms: vec![Law::Damping, Law::Stiffness],
         }
     }
 

@@ -13,7 +13,8 @@ use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Pa
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -29,7 +30,7 @@ pub fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

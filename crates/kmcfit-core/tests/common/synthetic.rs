@@ -5,8 +5,9 @@ use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, InputSample, NodalCoefficients, StageSamples, State, System, Term,
+    Excitation, InputSample, NodalCoefficients, StageSamples, State, System,
 };
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -69,16 +70,16 @@ impl Truth<'_> {
     }
 }
 
-fn response(term: Term) -> Response {
+fn response(term: Law) -> Response {
     match term {
-        Term::Damping => Response::Damping,
-        Term::Stiffness => Response::Stiffness,
-        Term::QuadraticStiffness => Response::QuadraticSpring,
-        Term::CubicStiffness => Response::Cubic,
-        Term::QuinticStiffness => Response::Quintic,
-        Term::QuadraticDamping => Response::Quadratic,
-        Term::CoulombFriction { width } => Response::Coulomb(width),
-        Term::Offset => Response::Offset,
+        Law::Damping => Response::Damping,
+        Law::Stiffness => Response::Stiffness,
+        Law::QuadraticStiffness => Response::QuadraticSpring,
+        Law::CubicStiffness => Response::Cubic,
+        Law::QuinticStiffness => Response::Quintic,
+        Law::QuadraticDamping => Response::Quadratic,
+        Law::CoulombFriction { width } => Response::Coulomb(width),
+        Law::Offset => Response::Offset,
     }
 }
 

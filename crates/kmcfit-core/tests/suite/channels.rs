@@ -10,8 +10,9 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::objective::{Evaluation, GradientKind};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, Grid, InputSample, Method, StageSamples, State, System, Term,
+    Excitation, Grid, InputSample, Method, StageSamples, State, System,
 };
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
@@ -20,39 +21,39 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 const WIDTH: f64 = 0.3;
-const TERMS: [(Response, Term, CoefficientKind); 8] = [
-    (Response::Damping, Term::Damping, CoefficientKind::Damping),
+const TERMS: [(Response, Law, CoefficientKind); 8] = [
+    (Response::Damping, Law::Damping, CoefficientKind::Damping),
     (
         Response::Stiffness,
-        Term::Stiffness,
+        Law::Stiffness,
         CoefficientKind::Stiffness,
     ),
     (
         Response::QuadraticSpring,
-        Term::QuadraticStiffness,
+        Law::QuadraticStiffness,
         CoefficientKind::QuadraticStiffness,
     ),
     (
         Response::Quintic,
-        Term::QuinticStiffness,
+        Law::QuinticStiffness,
         CoefficientKind::QuinticStiffness,
     ),
     (
         Response::Cubic,
-        Term::CubicStiffness,
+        Law::CubicStiffness,
         CoefficientKind::CubicStiffness,
     ),
     (
         Response::Quadratic,
-        Term::QuadraticDamping,
+        Law::QuadraticDamping,
         CoefficientKind::QuadraticDamping,
     ),
     (
         Response::Coulomb(WIDTH),
-        Term::CoulombFriction { width: WIDTH },
+        Law::CoulombFriction { width: WIDTH },
         CoefficientKind::CoulombFriction,
     ),
-    (Response::Offset, Term::Offset, CoefficientKind::Offset),
+    (Response::Offset, Law::Offset, CoefficientKind::Offset),
 ];
 const LOSSES: [Loss; 3] = [
     Loss::Squares,

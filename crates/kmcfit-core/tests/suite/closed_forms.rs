@@ -3,13 +3,14 @@
 use crate::common;
 
 use crate::common::closed_form::{Bessel, constant_coefficients};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 
 fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

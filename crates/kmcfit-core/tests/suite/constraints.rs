@@ -9,7 +9,8 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::qp::{ConicStatus, project};
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::StartProjection;
-use kmcfit_core::internals::system::{Grid, Method, State, System, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Grid, Method, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -371,7 +372,7 @@ fn problem(functions: Parameterization) -> Problem {
     let system = System {
         grid: grid(),
         method: Method::Midpoint,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let initial = State {
         displacement: 1.0,

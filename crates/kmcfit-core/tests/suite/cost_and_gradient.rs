@@ -5,7 +5,7 @@ use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
-use kmcfit_core::internals::simulate::Cause;
+use kmcfit_core::internals::step::Cause;
 
 /// Rounding of the same sums in another order, relative to the largest entry.
 const ROUNDING: f64 = 1e-11;

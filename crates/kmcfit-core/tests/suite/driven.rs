@@ -3,9 +3,10 @@
 
 use crate::common::closed_form::constant_coefficients;
 use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::simulate::{Trajectory, reference};
+use kmcfit_core::internals::step::{Trajectory, observe};
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System, Term,
+    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
     TimePoint,
 };
 use std::f64::consts::PI;
@@ -23,7 +24,7 @@ fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 
@@ -146,7 +147,7 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                     let relative = settled.iter().map(|i| {
                         let place = TimePoint::node(*i, nodes);
                         let around = excitation.input_at(place);
-                        let sensed = reference::observe(
+                        let sensed = observe(
                             &system,
                             kind,
                             &nodal,
@@ -243,7 +244,7 @@ fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     // A step 1/20 of the time that the speed takes to cross the narrowest width.
     let nodes = 40_001;
     let mut system = system(nodes, 2.0 * PI * 3.2, Method::Rk4);
-    system.terms = vec![Term::Stiffness, Term::CoulombFriction { width }];
+    system.terms = vec![Law::Stiffness, Law::CoulombFriction { width }];
     let initial = State {
         displacement: 1.0,
         velocity: 0.0,
@@ -352,7 +353,7 @@ fn samples_between_nodes_have_the_order_of_the_stepper() {
                             force: (w * t).cos(),
                             base: 0.0,
                         };
-                        let seen = reference::observe(
+                        let seen = observe(
                             &system,
                             kind,
                             &nodal,

@@ -9,9 +9,8 @@ use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Pa
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Measurements, equation_error};
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::f64::consts::TAU;
 
 const NODES: usize = 401;
@@ -175,7 +174,7 @@ fn cosines() -> Problem {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     Problem::new(system, functions, COSINES.map(record).to_vec()).unwrap()
 }

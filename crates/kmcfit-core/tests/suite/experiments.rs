@@ -10,9 +10,8 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit};
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 const NODES: usize = 401;
 const DURATION: f64 = 25.0;
@@ -40,7 +39,7 @@ fn system(nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

@@ -11,8 +11,9 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::signal::{SecondOrder, band_pass};
 use kmcfit_core::internals::solvers::fit;
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
-    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System, Term,
+    Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -29,7 +30,7 @@ const INITIAL: State = State {
     velocity: -0.5,
 };
 
-fn system(terms: &[Term]) -> System {
+fn system(terms: &[Law]) -> System {
     System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
@@ -98,7 +99,7 @@ fn stiffness() -> EstimatedFunction {
     lines(CoefficientKind::Stiffness, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
 }
 
-const LINEAR: [Term; 2] = [Term::Damping, Term::Stiffness];
+const LINEAR: [Law; 2] = [Law::Damping, Law::Stiffness];
 
 fn known_mass() -> Vec<f64> {
     let times = grid().times();
@@ -238,7 +239,7 @@ fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) 
 
 /// A system, its records and its estimated parameters.
 struct Case {
-    terms: Vec<Term>,
+    terms: Vec<Law>,
     /// `None` where the mass is known.
     mass: Option<EstimatedFunction>,
     functions: Vec<EstimatedFunction>,
@@ -528,14 +529,14 @@ fn all_together() {
     );
     Case {
         terms: vec![
-            Term::Damping,
-            Term::Stiffness,
-            Term::QuadraticStiffness,
-            Term::CubicStiffness,
-            Term::QuinticStiffness,
-            Term::QuadraticDamping,
-            Term::CoulombFriction { width: WIDTH },
-            Term::Offset,
+            Law::Damping,
+            Law::Stiffness,
+            Law::QuadraticStiffness,
+            Law::CubicStiffness,
+            Law::QuinticStiffness,
+            Law::QuadraticDamping,
+            Law::CoulombFriction { width: WIDTH },
+            Law::Offset,
         ],
         mass: Some(lines(
             CoefficientKind::Mass,
@@ -585,7 +586,7 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
     let mut second = Record::free(vec![filtered]);
     second.coefficient_set = 1;
     let case = Case {
-        terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        terms: vec![Law::Damping, Law::Stiffness, Law::CubicStiffness],
         mass: None,
         functions: vec![
             nodal(CoefficientKind::Damping, 0.25, 0.01, 0.4),

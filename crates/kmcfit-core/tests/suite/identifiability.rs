@@ -15,9 +15,8 @@ use kmcfit_core::internals::identifiability::{
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
 
 const QUANTITIES: [CoefficientKind; 3] = [
@@ -202,7 +201,7 @@ proptest! {
         let system = System {
             grid: Grid::new(0.0, 4.0, nodes).unwrap(),
             method: if rk4 { Method::Rk4 } else { Method::Midpoint },
-            terms: vec![Term::Damping, Term::Stiffness],
+            terms: vec![Law::Damping, Law::Stiffness],
         };
         let grid = system.grid;
         let function = |(base, swing, pace): (f64, f64, f64)| -> Vec<f64> {

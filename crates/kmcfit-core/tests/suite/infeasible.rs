@@ -163,7 +163,7 @@ fn badly_scaled_constraints_end_with_a_point() {
             };
             problem = problem
                 .with(|parts| {
-                    parts.functions = parts.functions.clone().with_start(&start);
+                    parts.functions.set_start(&start);
                 })
                 .unwrap();
             let found = run(&problem, solver, 100);

@@ -4,6 +4,7 @@ use crate::common::closed_form::constant_coefficients;
 use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
+use kmcfit_core::internals::constraints::TimeHistory;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -69,7 +70,10 @@ fn carriage(samples: usize) -> Builder {
             .sigma(SIGMA)
     };
     let slowly = times.iter().map(|t| 0.3 + 0.01 * t).collect();
-    let known = CoefficientSpec::fixed_at_nodes(slowly);
+    let known = CoefficientSpec::known(TimeHistory::Nodal {
+        name: "known".into(),
+        values: slowly,
+    });
     let block = CoefficientSpec::uncertain(1.4, 0.05);
     let part = |spec: CoefficientSpec| CoefficientSpec::shared().known_part(spec);
     Builder::new([

@@ -3,11 +3,10 @@
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Experiment;
-use kmcfit_core::internals::simulate::Trajectory;
 use kmcfit_core::internals::solvers::Fit;
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::step::Trajectory;
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
@@ -88,7 +87,7 @@ fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

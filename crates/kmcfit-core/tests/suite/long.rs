@@ -9,7 +9,8 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit_with_noise};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 use std::f64::consts::{PI, TAU};
 
 /// From 1 Hz to 2 Hz in 200 s: 300 periods.
@@ -27,7 +28,7 @@ fn system() -> System {
     System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

@@ -6,10 +6,9 @@ use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Rec
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::simulate::Trajectory;
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::step::Trajectory;
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 const NOISE: f64 = 0.01;
 const REST: State = State {
@@ -95,7 +94,7 @@ impl Case {
     }
 }
 
-fn system(nodes: usize, duration: f64, terms: &[Term]) -> System {
+fn system(nodes: usize, duration: f64, terms: &[Law]) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
@@ -109,7 +108,7 @@ fn push(grid: &Grid, force: impl Fn(f64) -> f64) -> Excitation {
 }
 
 fn duffing(factors: [f64; 4]) -> Case {
-    let terms = [Term::Damping, Term::Stiffness, Term::CubicStiffness];
+    let terms = [Law::Damping, Law::Stiffness, Law::CubicStiffness];
     // 30 to 60 steps in a period of the system, which is 2 to 4 s.
     let system = system(1501, 100.0, &terms);
     let truth = [
@@ -148,7 +147,7 @@ const PERIODS: usize = 6;
 const STEPS: usize = 600;
 
 fn stick_slip() -> Case {
-    let terms = [Term::Stiffness, Term::CoulombFriction { width: WIDTH }];
+    let terms = [Law::Stiffness, Law::CoulombFriction { width: WIDTH }];
     // A step of 0.02 s: friction alone slows the mass within width m / F = 0.017 s while it sticks,
     // and the stepper is stable up to 2.8 of these.
     let system = system(PERIODS * STEPS + 1, PERIODS as f64 * PERIOD, &terms);

@@ -7,8 +7,8 @@ use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind, Ratios};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::simulate::reference;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::internals::step::Driven;
 use kmcfit_core::internals::system::{Method, NodalCoefficients, System};
 
 fn settings(initial: Initial) -> FitSettings {
@@ -192,8 +192,12 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
                 },
             };
             let response = &here.trajectories[0];
-            reference::tangent(&problem.system, &here.nodal, None, response, &direction)
-                .displacement
+            let driven = Driven {
+                system: &problem.system,
+                nodal: &here.nodal,
+                excitation: None,
+            };
+            driven.tangent(response, &direction).displacement
         })
         .collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

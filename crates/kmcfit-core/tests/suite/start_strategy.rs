@@ -9,9 +9,8 @@ use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
 };
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 /// Nodes from one sample to the next.
 const STRIDE: usize = 20;
@@ -26,7 +25,7 @@ fn problem() -> Problem {
     let system = System {
         grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let truth = NodalCoefficients {
         mass: vec![1.0; nodes],
@@ -127,7 +126,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let system = System {
         grid: Grid::new(0.0, 40.0, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        terms: vec![Law::Damping, Law::Stiffness, Law::CubicStiffness],
     };
     let truth = [1.0, 1.2, 20.0, 15.0];
     let nodal = NodalCoefficients {
@@ -224,7 +223,7 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
     let system = System {
         grid: Grid::new(0.0, 20.0, nodes).unwrap(),
         method: Method::Midpoint,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     // A response that no oscillator has.
     let observed = (0..nodes).map(|i| ((i * i) as f64).sin()).collect();

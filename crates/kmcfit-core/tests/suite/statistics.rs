@@ -10,9 +10,8 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::solvers::fit_with_noise;
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -32,7 +31,7 @@ type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
 
 /// A system of constants with one channel sampled at all nodes.
 struct Setup {
-    terms: Vec<(Term, CoefficientKind)>,
+    terms: Vec<(Law, CoefficientKind)>,
     /// Mass first; `None` for what is known.
     start: Vec<Option<f64>>,
     truth: Vec<f64>,
@@ -49,8 +48,8 @@ impl Setup {
     fn free(kind: ChannelKind) -> Self {
         Self {
             terms: vec![
-                (Term::Damping, CoefficientKind::Damping),
-                (Term::Stiffness, CoefficientKind::Stiffness),
+                (Law::Damping, CoefficientKind::Damping),
+                (Law::Stiffness, CoefficientKind::Stiffness),
             ],
             truth: vec![1.0, 0.2, 4.0],
             start: vec![None, Some(0.25), Some(3.8)],

@@ -163,7 +163,17 @@ pub fn read(
             .expected("two columns"));
     }
     repeats(file, spec, wanted.experiment, table, &times, notes);
-    let inside = inside(file, &experiment, spec, &times.values)?;
+    let mut inside = inside(file, &experiment, spec, &times.values)?;
+    // Responses are used at times at which every channel of the file has a sample before and after.
+    let late = table.late(index);
+    let lates = || (0..table.width()).map(|i| table.late(i));
+    let is_response = Quantity::ALL.iter().any(|kind| kind.name() == wanted.name)
+        && wanted.kind != Quantity::Force;
+    if is_response && inside.len() > 2 {
+        inside.start += usize::from(inside.start == 0 && lates().any(|other| other > late));
+        let is_last = inside.end == times.values.len();
+        inside.end -= usize::from(is_last && lates().any(|other| other < late));
+    }
     let duplicates = spec.duplicates.unwrap_or_default();
     let codes = spec.missing.as_ref().map_or(&[][..], OneOrList::values);
     let is_code = |value: f64| codes.iter().any(|code| code.0 == value);
@@ -180,7 +190,9 @@ pub fn read(
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
     Ok(ColumnSamples {
         outside: times.values.len() - inside.len(),
-        times: times.values[inside].iter().map(|t| t - zero).collect(),
+        times: (times.values[inside].iter())
+            .map(|t| t - zero + late)
+            .collect(),
         values,
         beside,
         unit: unit.unit,

@@ -262,8 +262,10 @@ fn signal(
         |run: &&Range<usize>| source.times[run.start] <= from && source.times[run.end - 1] >= to;
     match known.iter().find(covers).cloned() {
         Some(run) => {
-            source.times = source.times[run.clone()].to_vec();
-            source.values = source.values[run].to_vec();
+            source.times.truncate(run.end);
+            source.times.drain(..run.start);
+            source.values.truncate(run.end);
+            source.values.drain(..run.start);
         }
         None => return Err(gaps(file, &key, &source, &known, zero)),
     }

@@ -39,8 +39,8 @@ pub fn refuse_one_column_twice(
     Ok(())
 }
 
-/// Factors between units in which one signal is written twice: the same, g and m/s^2, thousandths, hundredths.
-const FACTORS: [f64; 7] = [1.0, 9.806_65, 1.0 / 9.806_65, 1e3, 1e-3, 1e2, 1e-2];
+/// Factors of one signal that is written twice: in the same unit, in g and m/s^2. Others are those of a free mass without noise.
+const FACTORS: [f64; 3] = [1.0, 9.806_65, 1.0 / 9.806_65];
 /// Difference of such signals by the rounding of seven digits, relative to their largest value; noise of sensors is above it.
 const ROUNDING: f64 = 1e-6;
 

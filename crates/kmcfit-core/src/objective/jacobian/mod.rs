@@ -9,7 +9,7 @@ use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
 use crate::simd::tall_qr::{RowBlock, order_by};
-use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
+use crate::step::tangents::TILE;
 use nalgebra::DMatrix;
 use observation_rows::JacobianRows;
 use sensitivity_layout::SensitivityLayout;
@@ -186,18 +186,12 @@ fn sweep(
         *block = take(full);
         block.restart(next);
     };
-    let base = BaseTrajectory {
-        system: view.system,
-        nodal: view.nodal,
-        excitation: view.excitation,
-        response: view.response,
-    };
     let mut from = steps.start;
     let mut last = 0;
     while from < steps.end {
         let to = (from + TILE).min(steps.end);
         layout.set_perturbations(&mut tangents, from, from == steps.start);
-        tangents.advance(base, from..to);
+        tangents.advance(view.driven(), view.response, from..to);
         for (reader, block) in &mut readers {
             while reader.read(&tangents, from..to, block) {
                 give(block);
@@ -250,7 +244,9 @@ mod tests {
     use crate::objective::GradientKind;
     use crate::record::ChannelKind;
     use crate::record::Weighting;
-    use crate::system::{Excitation, Grid, Method, State, System, Term};
+    use crate::structure::Law;
+    use crate::system::Method;
+    use crate::system::{Excitation, Grid, State, System};
 
     const NODES: usize = 70;
 
@@ -298,7 +294,7 @@ mod tests {
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: vec![Term::Damping, Term::Stiffness],
+            terms: vec![Law::Damping, Law::Stiffness],
         };
         let records = vec![record(0, NODES), record(1, nodes)];
         Problem::new(system, functions.expect("functions"), records).unwrap()

@@ -4,11 +4,9 @@ use crate::objective::SimulatedRecord;
 use crate::record::Channel;
 use crate::simd::tall_qr::RowBlock;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
-use crate::simulate::Observation;
-use crate::simulate::fast::nodal_observations::Accelerations;
-use crate::simulate::fast::sensitivities::{
-    ConstantPerturbation, FunctionPerturbation, TILE, Tangents,
-};
+use crate::step::Observation;
+use crate::step::nodal_observations::Accelerations;
+use crate::step::tangents::{ConstantPerturbation, FunctionPerturbation, TILE, Tangents};
 use crate::system::FUNCTIONS;
 use std::ops::Range;
 

@@ -4,7 +4,7 @@
 use crate::functions::{Design, Parameterization};
 use crate::record::Experiment;
 use crate::simd::LANES;
-use crate::simulate::fast::sensitivities::{ConstantPerturbation, Slot, TILE_NODES, Tangents};
+use crate::step::tangents::{ConstantPerturbation, Slot, TILE_NODES, Tangents};
 
 /// Functions of the coefficient set of one experiment, with the group and lane of each of their parameters.
 pub(super) struct SensitivityLayout<'a> {

@@ -38,7 +38,7 @@ use super::termination::Outcome;
 use super::timings::Timings;
 use crate::problem::Problem;
 use crate::record::Weighting;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use levels::{LevelModel, Levels};
 use std::time::Duration;
 

@@ -9,8 +9,7 @@ use crate::qp::{ResponseVariables, StageLayout, Subproblem};
 use crate::record::{Channel, ChannelKind, Experiment, Majorant, Weighting};
 use crate::rows::merge_columns;
 use crate::signal::SecondOrder;
-use crate::simulate::reference::step_jacobians;
-use crate::simulate::{StepJacobian, Trajectory};
+use crate::step::{StepJacobian, Trajectory};
 
 /// Capacity for a linearised step: three states, three functions at both ends.
 const ENTRIES: usize = 9;
@@ -19,7 +18,7 @@ const ENTRIES: usize = 9;
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        step_jacobians(view.system, view.nodal, view.excitation, view.response)
+        view.driven().step_jacobians(view.response)
     });
     each.collect()
 }

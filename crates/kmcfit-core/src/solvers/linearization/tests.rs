@@ -8,11 +8,12 @@ use crate::noise::{Autoregression, Correlation, CorrelationLaw};
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, NoiseEstimate, Weighting};
 use crate::signal::low_pass;
-use crate::simulate::fast::sensitivities::TILE;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::{Fit, fit, fit_from};
-use crate::system::{Excitation, Grid, Method, State, System, Term};
+use crate::step::tangents::TILE;
+use crate::structure::Law;
+use crate::system::{Excitation, Grid, Method, State, System};
 use crate::threads;
 
 fn fitted(problem: &Problem) -> Fit {
@@ -73,7 +74,7 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let functions = functions.with_scalars(vec![speed]);
     Problem::new(system, functions, vec![record]).unwrap()
@@ -139,7 +140,10 @@ fn the_jacobian_is_reused_after_short_steps() {
         adjoint, tangent, ..
     } = fit.counts;
     assert!(0 < adjoint && adjoint < points);
-    assert_eq!(tangent, (points - adjoint) * parameters);
+    // One at each point without an adjoint, and where a step with an earlier one fails at the level of rounding.
+    let jacobians = tangent / parameters;
+    assert_eq!(tangent, jacobians * parameters);
+    assert!((points - adjoint..points).contains(&jacobians));
     let theta = &fit.best.parameters;
     // The gradient at the end may come from either method: both have the rounding error of the one at the start.
     let at_start = problem.evaluate(&problem.start()).expect("a motion");
@@ -156,13 +160,12 @@ fn the_jacobian_is_reused_after_short_steps() {
     let reduced = reduce(&problem, &fit.best.evaluation, &mut timings);
     let step = reduced.solution().expect("independent columns");
     let order = problem.places();
-    for (step, j) in step.iter().zip(order) {
-        assert!(
-            step.abs() <= 1e-9 * theta[j].abs(),
-            "{step} of {}",
-            theta[j]
-        );
-    }
+    // What the last step, with a Jacobian computed before, has left: less than the tolerance of the cost.
+    let mut minimum = theta.clone();
+    (step.iter().zip(order)).for_each(|(step, j)| minimum[j] += step);
+    let lowest = problem.evaluate(&minimum).expect("a motion").cost;
+    let cost = fit.best.evaluation.cost;
+    assert!(cost - lowest <= 1e-10 * cost, "{cost} {lowest}");
 }
 
 /// Results on one thread and on two are bit-identical.

@@ -13,7 +13,7 @@ use crate::record::Experiment;
 use crate::signal::{Spectrum, median_spacing};
 use crate::solvers::linearization::{Linearization, linearise};
 use crate::solvers::timings::Timings;
-use crate::system::Term;
+use crate::structure::Law;
 use crate::threads::{analyses_at_once, map};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -138,13 +138,13 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
     let functions = &constants.functions;
     let set = functions.coefficient_set(0);
     let terms = &problem.system.terms;
-    let at = |kind: Term| {
+    let at = |kind: Law| {
         terms
             .iter()
             .position(|t| *t == kind)
             .map(|place| set[place + 1])
     };
-    let (mass, stiffness) = (set[0], at(Term::Stiffness)?);
+    let (mass, stiffness) = (set[0], at(Law::Stiffness)?);
     let first = |f: usize| functions.ranges()[f].clone().next();
     (first(mass).is_some() || first(stiffness).is_some()).then_some(())?;
     let base = transferred(problem, start, constants);
@@ -174,7 +174,7 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
             }
             (None, None) => (m, k),
         };
-        if let Some(i) = at(Term::Damping).and_then(first) {
+        if let Some(i) = at(Law::Damping).and_then(first) {
             let least = 2.0 * LEAST_DAMPING_RATIO * (to_mass * to_stiffness).sqrt();
             theta[i] = theta[i].max(least);
         }

@@ -231,7 +231,9 @@ mod tests {
     use super::*;
     use crate::functions::CoefficientKind;
     use crate::record::{Channel, Weighting};
-    use crate::system::{Method, State, Term};
+    use crate::structure::Law;
+    use crate::system::Method;
+    use crate::system::State;
 
     /// A free decay with two constants, and a sample at every node `0, stride, 2 stride, ...`.
     fn free_decay(nodes: usize, stride: usize) -> Problem {
@@ -253,7 +255,7 @@ mod tests {
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: vec![Term::Damping, Term::Stiffness],
+            terms: vec![Law::Damping, Law::Stiffness],
         };
         Problem::new(system, functions, vec![record]).expect("a problem")
     }

@@ -4,8 +4,8 @@ use super::{End, FAR, Interval, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
-use crate::simulate::SimulationError;
 use crate::solvers::{Iterate, Status, active_constraints, fit_from};
+use crate::step::SimulationError;
 use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
 

@@ -19,7 +19,7 @@ mod continuation;
 
 use super::functional::Linear;
 use crate::problem::Problem;
-use crate::simulate::SimulationError;
+use crate::step::SimulationError;
 use continuation::ProfileSearch;
 
 /// The 95 % quantile of chi-square with one degree of freedom.

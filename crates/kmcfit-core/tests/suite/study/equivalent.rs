@@ -1,10 +1,9 @@
 use kmcfit_core::internals::qp::ConicStatus;
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::study::equivalent_coefficients::{
     EquivalentOptions, TargetResponse, equivalent_coefficients,
 };
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -17,7 +16,7 @@ fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, 12.0, nodes).unwrap(),
         method,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

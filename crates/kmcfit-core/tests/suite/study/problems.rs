@@ -7,9 +7,8 @@ use kmcfit_core::internals::functions::{
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
-};
+use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 pub const SIGMA: f64 = 0.05;
 pub const REST: State = State {
@@ -21,7 +20,7 @@ pub fn system(duration: f64, nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     }
 }
 

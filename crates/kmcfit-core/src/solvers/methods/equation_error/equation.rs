@@ -16,7 +16,8 @@ use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
 use crate::record::{Experiment, Measured, Measurements};
-use crate::system::{NodalCoefficients, Term, TimePoint};
+use crate::structure::Law;
+use crate::system::{NodalCoefficients, TimePoint};
 
 /// Relative decrease of the cost from which a restored state is used.
 const RESTORED: f64 = 1e-6;
@@ -83,7 +84,7 @@ impl<'a> Equation<'a> {
             .functions
             .coefficient_set(experiment.coefficient_set);
         let has_no_jump = (set.iter().zip(0..)).all(|(function, f)| {
-            let is_differentiated = f == 0 || problem.system.terms[f - 1] == Term::Damping;
+            let is_differentiated = f == 0 || problem.system.terms[f - 1] == Law::Damping;
             !is_differentiated || is_continuous(problem.functions.get(*function))
         });
         let Some(plain) = measured.unsmoothed.as_ref().filter(|_| has_no_jump) else {
@@ -129,7 +130,7 @@ impl<'a> Equation<'a> {
     }
 
     /// Factor of a term that the equation may lack, in the form of the equation.
-    pub fn factor_of(&self, term: Term) -> Vec<f64> {
+    pub fn factor_of(&self, term: Law) -> Vec<f64> {
         let states = self.measured.y.iter().zip(&self.measured.v);
         let factor = states.map(|(y, v)| term.phi(*y, *v)).collect();
         self.averaged(self.measured.filtered(factor))
@@ -216,7 +217,7 @@ impl<'a> Equation<'a> {
     /// true if they do.
     fn restore(&mut self, problem: &Problem, theta: &[f64]) -> bool {
         let terms = &problem.system.terms;
-        let is_nonlinear = |term: &Term| !term.is_linear() && *term != Term::Offset;
+        let is_nonlinear = |term: &Law| !term.is_linear() && *term != Law::Offset;
         if self.bumps.is_none() || !terms.iter().any(is_nonlinear) {
             return false;
         }

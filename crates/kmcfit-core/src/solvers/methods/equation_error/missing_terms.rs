@@ -19,7 +19,7 @@ use crate::functions::CoefficientKind;
 use crate::noise::KernelCovariance;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::simd::sum::rms;
-use crate::system::Term;
+use crate::structure::Law;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -96,7 +96,7 @@ pub fn missing_terms(problem: &Problem, theta: &[f64]) -> Vec<MissingTerm> {
 /// A term that may be missing.
 struct Candidate {
     kind: CoefficientKind,
-    term: Term,
+    term: Law,
 }
 
 /// The terms that the model does not have.
@@ -176,7 +176,7 @@ impl<'a> WeakForm<'a> {
     }
 
     /// Factor of a candidate.
-    fn factor(&self, term: Term) -> DVector<f64> {
+    fn factor(&self, term: Law) -> DVector<f64> {
         let each = self.equations.list.iter().flat_map(|e| e.factor_of(term));
         let weighted = each.zip(&self.roots).map(|(x, root)| root * x);
         DVector::from_vec(weighted.collect())

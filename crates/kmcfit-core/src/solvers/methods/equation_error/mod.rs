@@ -36,8 +36,9 @@ use crate::record::{Experiment, Measured, Measurements};
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
 use crate::solvers::timings::{Timings, timed};
+use crate::structure::Law;
+use crate::system::NodalCoefficients;
 use crate::system::quadrature::trapezoid_weights;
-use crate::system::{NodalCoefficients, Term};
 use equation::Equation;
 
 /// Weight of the proximal term towards the start, relative to the equation error; it determines the directions that the
@@ -210,7 +211,7 @@ fn root_weight(
     let nodal = nodal(problem, experiment, start);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let terms = problem.system.terms.iter().zip(&nodal.coefficients);
-    let springs = terms.filter(|(term, _)| **term == Term::Stiffness);
+    let springs = terms.filter(|(term, _)| **term == Law::Stiffness);
     let springs = springs.map(|(_, k)| size(k) * size(&kinematics.y));
     let force_scale = springs.fold(size(&nodal.mass) * size(&kinematics.a), f64::max)
         / kinematics.size.max(f64::MIN_POSITIVE);

@@ -5,7 +5,7 @@ use crate::objective::SimulatedRecord;
 use crate::problem::Problem;
 use crate::record::{Channel, Measured};
 use crate::signal::zero_phase;
-use crate::simulate::Trajectory;
+use crate::step::Trajectory;
 use crate::system::{Grid, NodalCoefficients, TimePoint};
 use std::ops::Range;
 

@@ -6,6 +6,7 @@ use super::{scale_row, widths};
 use crate::identifiability::EquationRows;
 use crate::problem::Problem;
 use crate::record::Measurements;
+use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Largest work of a covariance, rows x parameters^2: some seconds, and memory for 120,000 rows of 64 parameters.
@@ -45,9 +46,12 @@ pub fn equation_rows(problem: &Problem, theta: &[f64]) -> Result<EquationRows, N
         let mut rows = dense.rows.rows_mut(record.start, record.len());
         rows *= curvature;
     }
-    let change = widths::change(problem, &measurements, &mut equations, theta);
-    let change = change.map(|change| &dense.rows * change);
     let scale = scale_row(problem, &problem.constraints, theta);
+    let change = match problem.functions.are_constants() {
+        true => widths::change(problem, &measurements, &mut equations, theta),
+        false => scale.is_none().then(|| shrinkage(problem, &dense, theta)),
+    };
+    let change = change.map(|change| &dense.rows * change);
     let scalars = problem.functions.scalar_range();
     let held = scalars.map(|j| vec![(j, 1.0)]).chain(scale.clone());
     Ok(EquationRows {
@@ -58,6 +62,18 @@ pub fn equation_rows(problem: &Problem, theta: &[f64]) -> Result<EquationRows, N
         held: held.collect(),
         is_scale_free: scale.is_some(),
     })
+}
+
+/// Shrinkage of the estimates by the errors `D` of the rows `X`, which contain the measured response: `(X^T X)^-1 D^T D theta`. Where the
+/// residuals are these errors, `D theta`, its part along the estimates is `theta |e|^2/|f|^2` with the known part `f` of the equation,
+/// the force.
+fn shrinkage(problem: &Problem, dense: &DenseRows, theta: &[f64]) -> DVector<f64> {
+    let functions = problem.functions.scalar_range().start;
+    let estimates = DVector::from_column_slice(&theta[..functions]);
+    let force = &dense.residuals - dense.rows.columns(0, functions) * &estimates;
+    let share = dense.residuals.norm_squared() / force.norm_squared();
+    let shift = if share.is_finite() { share } else { 0.0 };
+    (estimates * shift).resize_vertically(theta.len(), 0.0)
 }
 
 /// Responses of all experiments, for a minimum `theta` whose scale is determined or one number.

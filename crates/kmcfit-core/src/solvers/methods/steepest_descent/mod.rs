@@ -8,7 +8,6 @@ use crate::problem::Problem;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
-use batched_trials::BatchedTrials;
 
 /// Number of trial steps.
 const TRIALS: u32 = 50;
@@ -22,7 +21,6 @@ const LONGEST: f64 = 5.0;
 #[derive(Default)]
 pub struct SteepestDescent {
     spare: Vec<Evaluation>,
-    batched: BatchedTrials,
 }
 
 /// A trial that lowers the cost.
@@ -36,7 +34,7 @@ impl StepRule for SteepestDescent {
     fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         let lengths = lengths(point);
         let best = match batched_trials::ray(work.problem(), point) {
-            Some(ray) => (self.batched).lowest(work, point, ray, &lengths, &mut self.spare),
+            Some(ray) => batched_trials::lowest(work, point, ray, &lengths, &mut self.spare),
             None => self.one_by_one(work, point, &lengths),
         };
         match best {

@@ -2,10 +2,11 @@ use super::*;
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::objective::GradientKind;
 use crate::record::{Channel, Experiment};
-use crate::simulate::EngineMode;
 use crate::solvers::methods::steepest_descent::lengths;
 use crate::solvers::{FitSettings, Solver};
-use crate::system::{Grid, Method, State, System, Term};
+use crate::step::EngineMode;
+use crate::structure::Law;
+use crate::system::{Grid, Method, State, System};
 
 const NODES: usize = 401;
 
@@ -15,7 +16,7 @@ fn problem() -> Problem {
     let system = System {
         grid,
         method: Method::Midpoint,
-        terms: vec![Term::Damping, Term::Stiffness],
+        terms: vec![Law::Damping, Law::Stiffness],
     };
     let nodal = |quantity, start: f64| {
         CoefficientFunction::free(quantity, Basis::Nodal, &grid, vec![start; NODES])
@@ -52,12 +53,12 @@ fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     let evaluated = work.evaluate_into(&problem.start(), &mut evaluation);
     evaluated.expect("a motion");
     let mut points = vec![work.complete(problem.start(), evaluation)];
-    let (mut batched, mut spare) = (BatchedTrials::default(), Vec::new());
+    let mut spare = Vec::new();
     for _ in 0..steps {
         let point = points.last().expect("a point");
         let lengths = lengths(point);
         let ray = ray(problem, point).expect("the paper's problem");
-        let best = batched.lowest(&mut work, point, ray, &lengths, &mut spare);
+        let best = lowest(&mut work, point, ray, &lengths, &mut spare);
         let best = best.expect("a lower cost");
         points.push(work.complete(best.parameters, best.evaluation));
     }
@@ -84,27 +85,4 @@ fn steps_are_the_best_of_all_trials() {
         assert_eq!(after.evaluation.cost, lowest.0, "step {step}");
         assert!(after.parameters == trial(before, lowest.1), "step {step}");
     }
-}
-
-/// A response reconstructed from wrong states is recomputed.
-#[test]
-fn the_response_does_not_depend_on_the_stored_states() {
-    let problem = problem();
-    let mut expected = problem.workspace();
-    let evaluated = problem.evaluate_for(EngineMode::Reference, &problem.start(), &mut expected);
-    evaluated.expect("a motion");
-    let mut found = problem.workspace();
-    for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {
-        assert!(move_to(&problem, &problem.start(), states, &mut found));
-        assert!(found.nodal == expected.nodal && found.trajectories == expected.trajectories);
-        assert!(found.predictions == expected.predictions);
-    }
-    let mut without_mass = problem.start();
-    without_mass[7] = -1.0;
-    assert!(!move_to(
-        &problem,
-        &without_mass,
-        [[0.0; LANES]; 2],
-        &mut found
-    ));
 }

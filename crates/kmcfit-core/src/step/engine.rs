@@ -1,0 +1,346 @@
+//! Operations on a system of one coordinate: response, adjoint, tangent, and the linearisation of its steps.
+
+use super::adjoint::{Adjoint, Gradient};
+use super::error::{SimulationError, require_finite, require_positive_mass};
+use super::maps::{Linearise, StepMaps, Wanted};
+use super::response::{Linear, Prepared, in_paper_order};
+use super::stage::{DUFFING, Drive, LINEAR, Model};
+use super::tableau::{MIDPOINT, RK4, Tableau};
+use super::{CoefficientGradient, Trajectory};
+use crate::simd;
+use crate::structure::{Element, Law, MOST_ELEMENTS};
+use crate::system::{
+    Excitation, FUNCTIONS, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
+};
+
+/// Required agreement of a response with the paper's order of operations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EngineMode {
+    /// Every bit. The history of the paper's run depends on every bit.
+    Reference,
+    /// Machine precision at the highest speed.
+    Fastest,
+}
+
+/// Derivatives of the steps of one coordinate.
+pub(crate) type Maps = StepMaps<2, FUNCTIONS>;
+
+/// Largest number of nodes of a free linear record that is computed in the paper's order: gradient descent depends on every bit.
+const SHORTEST: usize = 64;
+
+impl EngineMode {
+    fn is_in_paper_order(
+        self,
+        system: &System,
+        excitation: Option<&Excitation>,
+        nodes: usize,
+    ) -> bool {
+        self == Self::Reference || nodes <= SHORTEST && system.is_linear_and_free(excitation)
+    }
+}
+
+/// A system with the values of its functions and its excitation.
+#[derive(Clone, Copy)]
+pub struct Driven<'a> {
+    /// Grid, method and laws.
+    pub system: &'a System,
+    /// Nodal values of mass and coefficients.
+    pub nodal: &'a NodalCoefficients,
+    /// `None` for a free response.
+    pub excitation: Option<&'a Excitation>,
+}
+
+/// Evaluates an expression with the kernel's model of a [`Driven`] system, its common lists of elements known to the compiler.
+macro_rules! with_model {
+    ($driven:expr, $model:ident => $call:expr) => {{
+        let driven: Driven = $driven;
+        let mut list = [Element::grounded(Law::Offset); MOST_ELEMENTS];
+        let laws = driven.system.terms.iter();
+        let filled = list
+            .iter_mut()
+            .zip(laws)
+            .map(|(element, law)| element.law = *law)
+            .count();
+        match (driven.system.method, &list[..filled]) {
+            (Method::Midpoint, list) if list == LINEAR => {
+                let $model = driven.model::<2, 2>(&MIDPOINT, list);
+                $call
+            }
+            (Method::Rk4, list) if list == LINEAR => {
+                let $model = driven.model::<2, 4>(&RK4, list);
+                $call
+            }
+            (Method::Rk4, list) if list == DUFFING => {
+                let $model = driven.model::<3, 4>(&RK4, list);
+                $call
+            }
+            (Method::Midpoint, list) => {
+                let $model = driven.model::<MOST_ELEMENTS, 2>(&MIDPOINT, list);
+                $call
+            }
+            (Method::Rk4, list) => {
+                let $model = driven.model::<MOST_ELEMENTS, 4>(&RK4, list);
+                $call
+            }
+        }
+    }};
+}
+
+impl<'a> Driven<'a> {
+    /// # Panics
+    /// If there are more functions than terms, functions of another length than the grid, or grid or excitation is shorter than `nodes`
+    /// nodes.
+    fn require(self, nodes: usize) -> Self {
+        let Self {
+            system,
+            nodal,
+            excitation,
+        } = self;
+        let grid = &system.grid;
+        let count = nodal.coefficients.len();
+        assert!(count <= system.terms.len(), "a term for each function");
+        assert!(
+            nodal.functions().all(|f| f.len() == grid.nodes()),
+            "functions on the nodes"
+        );
+        assert!(
+            (1..=grid.nodes()).contains(&nodes),
+            "a response within the grid"
+        );
+        assert!(
+            excitation.is_none_or(|e| e.covers(nodes)),
+            "an excitation as long as the response"
+        );
+        self
+    }
+
+    fn model<'b, const E: usize, const S: usize>(
+        self,
+        tableau: &'b Tableau<S>,
+        list: &'b [Element],
+    ) -> Model<'b, 1, E, S>
+    where
+        'a: 'b,
+    {
+        let coefficients = &self.nodal.coefficients;
+        let stages = |part: &'a Option<StageSamples>| part.as_ref().map(StageSamples::stages);
+        let driven = self
+            .excitation
+            .filter(|e| e.force.is_some() || e.base.is_some());
+        Model {
+            tableau,
+            list,
+            masses: [&self.nodal.mass],
+            coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
+            drives: driven.map(|e| {
+                [Drive {
+                    force: stages(&e.force),
+                    base: stages(&e.base),
+                }]
+            }),
+            dt: self.system.grid.step(),
+        }
+    }
+
+    /// Response from `initial` over the nodes of `trajectory`; a record may be shorter than the grid.
+    ///
+    /// # Errors
+    /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
+    pub fn respond(
+        self,
+        mode: EngineMode,
+        initial: State,
+        trajectory: &mut Trajectory,
+    ) -> Result<(), SimulationError> {
+        let grid = &self.system.grid;
+        require_positive_mass(grid, self.nodal)?;
+        let nodes = trajectory.nodes();
+        let in_order = mode.is_in_paper_order(self.system, self.excitation, nodes);
+        let is_linear = self.system.terms.iter().all(|law| law.is_linear());
+        let x = [[initial.displacement], [initial.velocity]];
+        let Trajectory {
+            displacement,
+            velocity,
+        } = &mut *trajectory;
+        let states = [[displacement.as_mut_slice()], [velocity.as_mut_slice()]];
+        with_model!(self.require(nodes), model => match (in_order, is_linear) {
+            (true, _) => in_paper_order(model, x, states),
+            (false, true) => simd::run(Linear { model, x, states }),
+            (false, false) => simd::run(Prepared { model, x, states }),
+        });
+        require_finite(grid, trajectory)
+    }
+
+    /// Adds the derivatives of a scalar cost of the response with respect to the functions to `gradient`, and returns those with respect
+    /// to the initial state. `source` has the derivatives of the cost with respect to displacement and velocity at every node.
+    ///
+    /// The result is the transpose of [`Driven::tangent`] to machine precision.
+    pub fn adjoint(
+        self,
+        trajectory: &Trajectory,
+        source: &Trajectory,
+        gradient: CoefficientGradient,
+    ) -> State {
+        let gradient = match gradient {
+            CoefficientGradient::AtNodes(nodal) => {
+                Gradient::AtNodes(nodal.functions_mut().map(Vec::as_mut_slice).collect())
+            }
+            CoefficientGradient::Summed(sums) => Gradient::Summed(sums),
+        };
+        let states = [[trajectory.displacement.as_slice()], [&trajectory.velocity]];
+        let source = [[source.displacement.as_slice()], [&source.velocity]];
+        let [[displacement], [velocity]] = with_model!(self.require(trajectory.nodes()), model => {
+            simd::run(Adjoint { model, states, source, gradient })
+        });
+        State {
+            displacement,
+            velocity,
+        }
+    }
+
+    /// [`Driven::adjoint`] with the derivatives at the nodes.
+    pub fn nodal_adjoint(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
+        let mut nodal = NodalCoefficients::zeros(self.nodal.mass.len(), self.system.terms.len());
+        let gradient = CoefficientGradient::AtNodes(&mut nodal);
+        let initial = self.adjoint(trajectory, source, gradient);
+        SystemTangent { nodal, initial }
+    }
+
+    /// Linearises the steps `from` to `from + 7` about the states of `trajectory`, which need not satisfy the equation of motion.
+    pub(crate) fn linearise(
+        self,
+        trajectory: &Trajectory,
+        from: usize,
+        wanted: &Wanted<FUNCTIONS>,
+        maps: &mut Maps,
+    ) {
+        let states = [[trajectory.displacement.as_slice()], [&trajectory.velocity]];
+        with_model!(self, model => {
+            simd::run(Linearise { model, states, from, wanted, maps });
+        });
+    }
+
+    /// Directional derivative of the response along `direction`.
+    pub fn tangent(self, trajectory: &Trajectory, direction: &SystemTangent) -> Trajectory {
+        let functions: Vec<&[f64]> = direction.nodal.functions().collect();
+        let mut out = Trajectory::zeros(trajectory.nodes());
+        let mut x = [direction.initial.displacement, direction.initial.velocity];
+        (out.displacement[0], out.velocity[0]) = (x[0], x[1]);
+        self.each_step(trajectory, false, |i, maps, l| {
+            let mut change = [0.0; 2];
+            for (end, change) in change.iter_mut().enumerate() {
+                for (f, values) in functions.iter().enumerate() {
+                    *change +=
+                        maps.left[f][end][l] * values[i] + maps.right[f][end][l] * values[i + 1];
+                }
+                *change += maps.growth[end][0][l] * x[0] + maps.growth[end][1][l] * x[1];
+            }
+            x = [x[0] + change[0], x[1] + change[1]];
+            (out.displacement[i + 1], out.velocity[i + 1]) = (x[0], x[1]);
+        });
+        out
+    }
+
+    /// Passes each step of the record to `take`, with the derivatives in one lane of the maps.
+    pub(crate) fn each_step(
+        self,
+        trajectory: &Trajectory,
+        inputs: bool,
+        mut take: impl FnMut(usize, &Maps, usize),
+    ) {
+        let steps = trajectory.nodes() - 1;
+        let driven = self.require(trajectory.nodes());
+        let wanted = Wanted {
+            ends: [true; FUNCTIONS],
+            sum: [false; FUNCTIONS],
+            inputs,
+        };
+        let mut maps = Maps::NOTHING;
+        for from in (0..steps).step_by(simd::LANES) {
+            driven.linearise(trajectory, from, &wanted, &mut maps);
+            for l in 0..simd::LANES.min(steps - from) {
+                take(from + l, &maps, l);
+            }
+        }
+    }
+}
+
+impl System {
+    /// Response in the paper's order of operations.
+    ///
+    /// # Errors
+    /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
+    ///
+    /// # Panics
+    /// If `nodal` or `excitation` does not fit the grid and the terms.
+    pub fn forward(
+        &self,
+        nodal: &NodalCoefficients,
+        initial: State,
+        excitation: Option<&Excitation>,
+    ) -> Result<Trajectory, SimulationError> {
+        let mut trajectory = Trajectory::zeros(self.grid.nodes());
+        let driven = Driven {
+            system: self,
+            nodal,
+            excitation,
+        };
+        driven.respond(EngineMode::Reference, initial, &mut trajectory)?;
+        Ok(trajectory)
+    }
+}
+
+/// True for systems with damping and stiffness alone and the midpoint rule, whose trial steps are computed in lanes.
+pub(crate) fn is_linear_midpoint(system: &System) -> bool {
+    system.method == Method::Midpoint && system.terms == [Law::Damping, Law::Stiffness]
+}
+
+/// Cost `J = sum_i w_i (y_i - observed_i)^2` of the free response by the midpoint rule with damping and stiffness, with the weights of
+/// inner nodes and of both ends, for the nodal values mass, damping, stiffness. Overwrites `gradient` with the gradient with respect to
+/// the functions; `None` where it does not apply or a result is not finite.
+pub(crate) fn least_squares(
+    system: &System,
+    functions: [&[f64]; 3],
+    initial: State,
+    observed: &[f64],
+    [inner, end]: [f64; 2],
+    gradient: [&mut [f64]; 3],
+) -> Option<f64> {
+    let [mass, damping, stiffness] = functions;
+    let nodes = observed.len();
+    let usable = is_linear_midpoint(system) && nodes > SHORTEST && simd::sum::are_positive(mass);
+    usable.then_some(())?;
+    let model = Model::<1, 2, 2> {
+        tableau: &MIDPOINT,
+        list: LINEAR,
+        masses: [mass],
+        coefficients: [damping, stiffness],
+        drives: None,
+        dt: system.grid.step(),
+    };
+    let (mut y, mut v) = (vec![0.0; nodes], vec![0.0; nodes]);
+    simd::run(Linear {
+        model,
+        x: [[initial.displacement], [initial.velocity]],
+        states: [[&mut y], [&mut v]],
+    });
+    let mut cost = 0.0;
+    let mut source = vec![0.0; nodes];
+    for (i, source) in source.iter_mut().enumerate() {
+        let weight = if i == 0 || i + 1 == nodes { end } else { inner };
+        let residual = y[i] - observed[i];
+        cost += weight * residual * residual;
+        *source = 2.0 * weight * residual;
+    }
+    let gradient = gradient.map(|g| {
+        g.fill(0.0);
+        g
+    });
+    let slopes = simd::run(Adjoint {
+        model,
+        states: [[&y], [&v]],
+        source: [[&source], [&vec![0.0; nodes]]],
+        gradient: Gradient::AtNodes(gradient.into()),
+    });
+    (cost.is_finite() && slopes.as_flattened().iter().all(|x| x.is_finite())).then_some(cost)
+}

@@ -1,9 +1,0 @@
-#![no_main]
-
-#[allow(dead_code, reason = "each program runs one of the targets")]
-#[path = "../../tests/fuzz/targets.rs"]
-mod targets;
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    targets::sequence(bytes);
-});
