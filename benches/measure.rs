@@ -6,6 +6,7 @@
 //! measure triad                     memory bandwidth of one core, bytes/s
 //! measure evaluation NODES SECONDS  cost and discrete gradient of the paper's problem
 //! measure starts STARTS THREADS     a study of so many starts of models/knots.yaml
+//! measure chain COORDINATES NODES   response, and its adjoint, of a chain of masses by the implicit midpoint rule
 //! ```
 
 mod common;
@@ -16,6 +17,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::study::multistart::multistart;
+use kmcfit_core::{Ends, Law, Method, Motion, StageSamples, Structure, Trajectory};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -34,6 +36,7 @@ fn main() {
         ["triad"] => triad(),
         ["evaluation", nodes, seconds] => evaluation(number(nodes), number(seconds)),
         ["starts", starts, threads] => study(number(starts), number(threads)),
+        ["chain", coordinates, nodes] => chain_of_masses(number(coordinates), number(nodes)),
         // `cargo bench` and `cargo test --benches` call every benchmark without such words.
         _ => println!("measure: see benches/race.py"),
     }
@@ -158,6 +161,57 @@ fn repeated(seconds: f64, mut call: impl FnMut()) -> f64 {
         times.push(clock.elapsed().as_secs_f64());
     }
     median(&mut times)
+}
+
+/// Times of the response, and of response and adjoint, of a chain of masses, springs and dampers with a force at its end.
+fn chain_of_masses(n: usize, nodes: usize) {
+    let ends = |j: usize| match j {
+        0 => Ends::ground(0),
+        _ => Ends::between(j, j - 1),
+    };
+    let elements = (0..n).flat_map(|j| [(Law::Damping, ends(j)), (Law::Stiffness, ends(j))]);
+    let structure = Structure::new(n, 0, (0..n).map(Ends::ground).collect(), elements.collect())
+        .expect("a chain");
+    let level = |f: usize| match f.checked_sub(n) {
+        None => 1.0,
+        Some(e) => [0.3, 40.0][e % 2],
+    };
+    let values: Vec<Vec<f64>> = (0..3 * n).map(|f| vec![level(f); nodes]).collect();
+    let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let force: Vec<f64> = (0..nodes).map(|i| (0.07 * i as f64).sin()).collect();
+    let force = StageSamples::linear(&force);
+    let motion = Motion {
+        structure: &structure,
+        method: Method::ImplicitMidpoint,
+        step: 0.02,
+        functions: &functions,
+        forces: &[(n - 1, &force)],
+        frames: &[],
+        supports: &[],
+    };
+    let initial = vec![0.0; 2 * n];
+    let mut states = Trajectory::zeros(n, nodes);
+    let forward = repeated(0.5, || {
+        motion
+            .respond(black_box(&initial), &mut states)
+            .expect("a motion");
+    });
+    let source = states.clone();
+    let mut gradient = values.clone();
+    let both = repeated(0.5, || {
+        motion
+            .respond(black_box(&initial), &mut states)
+            .expect("a motion");
+        let mut columns: Vec<&mut [f64]> = gradient.iter_mut().map(Vec::as_mut_slice).collect();
+        black_box(
+            motion
+                .adjoint(&states, &source, &mut columns)
+                .expect("an adjoint"),
+        );
+    });
+    println!(
+        "{{\"coordinates\": {n}, \"nodes\": {nodes}, \"forward_seconds\": {forward:.6e}, \"seconds\": {both:.6e}}}"
+    );
 }
 
 fn study(starts: usize, threads: usize) {

@@ -14,7 +14,7 @@ pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
     };
     let response = run.system.forward(&run.coefficients, let_go, None)?;
     let most = response
-        .displacement
+        .displacement(0)
         .iter()
         .fold(0.0, |most: f64, y| most.max(y.abs()));
     Ok([run.document.cost.ratio, most])

@@ -84,7 +84,9 @@ impl Run<'_> {
         });
         let acceleration = acceleration.collect();
         (
-            samples.map(|i| response.displacement[FINE * i]).collect(),
+            samples
+                .map(|i| response.displacement(0)[FINE * i])
+                .collect(),
             acceleration,
         )
     }

@@ -33,11 +33,11 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
 
     let free = Record::new("free decay")
         .from_state(1.0, 0.0)
-        .displacement(&times, &decay.displacement);
+        .displacement(&times, decay.displacement(0));
     let forced = Record::new("shaker")
         .from_state(0.0, 0.0)
         .force(&times, &force)
-        .displacement(&times, &shaken.displacement);
+        .displacement(&times, shaken.displacement(0));
     let parts = || [1.0, 0.1, 4.0].map(|start| CoefficientSpec::piecewise_linear(11, start));
     let alone = Builder::new(parts()).record(free.clone()).build()?;
     let pair = Builder::new(parts()).record(free).record(forced).build()?;

@@ -56,7 +56,7 @@ fn paper_readings(system: &System) -> Vec<f64> {
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
     let response = system.forward(&truth, INITIAL, None);
-    response.expect("a motion").displacement
+    response.expect("a motion").displacement(0).to_vec()
 }
 
 /// A model of `models/`, with some of its text replaced.
@@ -146,7 +146,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
     let response = response.expect("a motion");
     let acceleration: Vec<f64> = (0..samples)
         .map(|i| {
-            let (y, v) = (response.displacement[i], response.velocity[i]);
+            let (y, v) = (response.displacement(0)[i], response.velocity(0)[i]);
             force[i] - 1.2 * v - 20.0 * y - 15.0 * y * y * y
         })
         .collect();
@@ -166,7 +166,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         .with_excitation(excitation)
         .with_channel(channel(
             ChannelKind::Displacement,
-            response.displacement,
+            response.displacement(0).to_vec(),
             0.01,
         ))
         .with_channel(channel(ChannelKind::Acceleration, acceleration, 0.05));

@@ -149,7 +149,7 @@ fn free(run: &Run, state: State, kinds: &[ChannelKind]) -> Result<String, Failur
         .map_err(|breakdown| Failure::Numerical(format!("no response: {breakdown}")))?;
     let mut table = CsvTable::new().column("t_s", run.system.grid.times());
     for predicted in responses {
-        table = table.column("displacement_m", predicted.response.displacement);
+        table = table.column("displacement_m", predicted.response.displacement(0).to_vec());
     }
     Ok(table.to_csv())
 }

@@ -54,7 +54,7 @@ fn tables() -> Result<[String; 2], CommandError> {
         response.map_err(|error| CommandError::Numerical(format!("no response: {error}")))?;
     let record = CsvTable::new()
         .column("t_s", grid.times())
-        .column("y_m", response.displacement);
+        .column("y_m", response.displacement(0).to_vec());
     let truth = CsvTable::new()
         .column("t_s", grid.times())
         .column("mass_kg", coefficients.mass)

@@ -189,7 +189,7 @@ fn write(
     let pairs = predictions.responses.iter().zip(&predictions.bands);
     for (i, (predicted, band)) in pairs.enumerate() {
         let header = format!("y_{unit}_{}", i + 1);
-        table = table.column(header, predicted.response.displacement.clone());
+        table = table.column(header, predicted.response.displacement(0).to_vec());
         for (end, side) in ["low", "high"].into_iter().enumerate() {
             if let Some(band) = band {
                 let ends = band.iter().map(|ends| ends[end]).collect();
@@ -199,7 +199,7 @@ fn write(
         if let Some(truth) = &predicted.truth {
             table = table.column(
                 format!("true_y_{unit}_{}", i + 1),
-                truth.displacement.clone(),
+                truth.displacement(0).to_vec(),
             );
         }
     }

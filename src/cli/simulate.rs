@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             experiment.excitation.as_ref(),
         )
         .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
-    let mut samples = response.displacement;
+    let mut samples = response.displacement(0).to_vec();
     if let Some(noise) = &noise {
         let mut random = ChaCha8Rng::seed_from_u64(noise.seed);
         for y in &mut samples {

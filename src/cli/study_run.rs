@@ -221,7 +221,7 @@ impl StudyRun {
 
     /// The fit.
     fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), StudyError> {
-        let model = Arc::clone(&self.model);
+        let mut model = Arc::clone(&self.model);
         let shown = format!("study 1/{}: fit", model.study.analyses());
         let progress = Progress::new(&shown);
         let fit = match self.finished.take() {
@@ -230,7 +230,11 @@ impl StudyRun {
                 let (fitted, _, found) =
                     search(&model, &progress).map_err(StudyError::Numerical)?;
                 let fit = StudiedFit::of(&fitted, &found);
-                self.fitted = Some(fitted.problem);
+                self.fitted = Some(fitted.problem.clone());
+                // A fit that finds jumps has other parameters than its model.
+                if fitted.problem.parameters() != model.problem.parameters() {
+                    model = Arc::new(fitted);
+                }
                 fit
             }
         };

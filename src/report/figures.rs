@@ -309,8 +309,13 @@ pub fn predictions(t: &[f64], responses: &[PredictedResponse]) -> Figure {
         let (y, v) = (state.displacement, state.velocity);
         Panel::of_time("displacement y", "m")
             .title(format!("from y = {y} m, v = {v} m/s"))
-            .mark(found("predicted", t, &predicted.response.displacement))
-            .marks(predicted.truth.as_ref().map(|m| truth(t, &m.displacement)))
+            .mark(found("predicted", t, predicted.response.displacement(0)))
+            .marks(
+                predicted
+                    .truth
+                    .as_ref()
+                    .map(|m| truth(t, m.displacement(0))),
+            )
     }))
 }
 

@@ -281,7 +281,7 @@ impl FittedModel<'_> {
         let last = self.fit.history.len();
         if snapshots.last().is_none_or(|s| s.0 != last) {
             let response = &self.fit.best.evaluation.trajectories[experiment];
-            snapshots.push((last, grid_times, &response.displacement));
+            snapshots.push((last, grid_times, response.displacement(0)));
         }
         figures::response(times, observed, &snapshots)
     }

@@ -161,8 +161,8 @@ impl FittedModel<'_> {
                 rows(&values)
             };
             table = table
-                .column(name(y), full(&response.displacement))
-                .column(name(v), full(&response.velocity));
+                .column(name(y), full(response.displacement(0)))
+                .column(name(v), full(response.velocity(0)));
             if let [channel] = experiment.channels.as_slice()
                 && let Some(stride) = channel.stride()
             {

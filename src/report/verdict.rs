@@ -192,8 +192,8 @@ impl FittedModel<'_> {
         let responses = self.fit.best.evaluation.trajectories.iter();
         let response = responses.fold([0.0f64; 2], |most, response| {
             [
-                most[0].max(largest(&response.displacement)),
-                most[1].max(largest(&response.velocity)),
+                most[0].max(largest(response.displacement(0))),
+                most[1].max(largest(response.velocity(0))),
             ]
         });
         Implausible::of(frequency, (!self.is_rotation()).then_some(response))

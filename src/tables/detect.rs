@@ -75,7 +75,12 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     }
 }
 
-/// The text without lines of words after the last row, where rows begin with a number or a time; and the number of these lines.
+/// First words of rows of statistics after the samples.
+const STATISTICS: &str =
+    "mean average avg mittelwert min minimum max maximum std stdev sd rms median sum total count";
+
+/// The text without lines of words or statistics after the last row, where rows begin with a number or a time; and the number of these
+/// lines.
 pub(super) fn without_footer<'a>(text: &'a str, layout: &Layout) -> (&'a str, usize) {
     let is_word = |field: &str| {
         let field = field.trim().trim_matches('"');
@@ -91,7 +96,14 @@ pub(super) fn without_footer<'a>(text: &'a str, layout: &Layout) -> (&'a str, us
             |field: &&str| matches!(field::read(field.trim(), layout.decimal), Field::Number(_));
         let is_row = layout.width == Some(fields.len())
             && (fields.len() == 1 || fields.iter().any(is_number));
-        line.starts_with('#') || fields.first().is_some_and(|first| is_word(first)) && !is_row
+        let is_statistic = |first: &str| {
+            let first = first.trim().trim_matches('"').trim_end_matches([':', '.']);
+            STATISTICS
+                .split(' ')
+                .any(|word| first.eq_ignore_ascii_case(word))
+        };
+        let is_text = |first: &str| is_word(first) && !is_row || is_statistic(first);
+        line.starts_with('#') || fields.first().is_some_and(|first| is_text(first))
     };
     let begins = |line: &str| line.trim_start().chars().next().is_some();
     let (mut rest, mut count) = (text, 0);

@@ -348,6 +348,7 @@ impl Table {
         if table.headers.is_empty() && format.header.is_none() {
             table.name_by_comments(&text, layout.delimiter);
         }
+        table.units_by_preamble(&text, layout.delimiter);
         // A row of units without names begins with that of the times.
         let is_time = |name: &String| Unit::recognise(Quantity::Time, name).is_some();
         let mut others = table.headers.iter().skip(1);

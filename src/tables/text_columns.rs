@@ -5,11 +5,13 @@ use super::origin::ColumnValues;
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
-use crate::units::{Quantity, Unit};
+use crate::units::{Quantity, Unit, unbracketed};
 use kmcfit_core::internals::signal::median;
 
 /// Delimiters of names in a comment beside that of the rows.
 const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
+/// Keys of a line of units before the rows.
+const UNIT_KEYS: [&str; 4] = ["units", "unit", "einheiten", "einheit"];
 /// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.
 const SINCE_1970: [(f64, &str); 3] = [(1e11, "ms"), (1e14, "µs"), (1e17, "ns")];
 /// Serial days of spreadsheets, of the years from 1982 to 2119, and the spacing (s) below which these are no seconds.
@@ -57,6 +59,42 @@ impl Table {
         if names.iter().all(is_name) {
             self.headers = names;
             self.units = units;
+        }
+    }
+
+    /// Takes the units of a line such as `# units: s, N, g` before the rows, where it has as many as there are columns; another number of units
+    /// is stated and not applied.
+    pub(super) fn units_by_preamble(&mut self, text: &str, delimiter: char) {
+        let before = self.lines.first().map_or(0, |line| line.saturating_sub(1));
+        let stated = text.lines().take(before).find_map(|line| {
+            let line = line.trim_start_matches(|c: char| !c.is_alphanumeric());
+            let (word, rest) = line.split_once([':', '='])?;
+            let is_key = |key: &str| word.trim().eq_ignore_ascii_case(key);
+            UNIT_KEYS
+                .iter()
+                .any(|key| is_key(key))
+                .then_some(rest.trim())
+        });
+        let Some(stated) = stated.filter(|_| self.units.is_empty()) else {
+            return;
+        };
+        let mut signs = std::iter::once(delimiter).chain(DELIMITERS);
+        let is_unit = |text: &String| text == "-" || Unit::any(unbracketed(text)).is_some();
+        let begins_with_times = quantity_of(self.quantity_name(0)) == Some(Quantity::Time);
+        let units = signs.find_map(|sign| {
+            let mut fields = split(stated, sign);
+            if begins_with_times && fields.len() + 1 == self.columns.len() {
+                fields.insert(0, "-".into());
+            }
+            (fields.len() == self.columns.len() && fields.iter().all(is_unit)).then_some(fields)
+        });
+        match units {
+            Some(units) => self.units = units,
+            None => {
+                let statement = format!("the units {}", quote(stated));
+                let columns = self.columns.iter_mut();
+                columns.for_each(|column| column.unapplied.push(statement.clone()));
+            }
         }
     }
 

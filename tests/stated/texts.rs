@@ -82,6 +82,25 @@ fn times_in_many_notations() {
     }
 }
 
+/// A line of units before the names is applied, for all columns or all but the times; a line of another number of units is a reason.
+#[test]
+fn units_before_the_names_are_applied_or_named() {
+    let rows = table("t,x", |i| format!("{:.2}", 0.02 * i as f64));
+    for line in [
+        "# units: s, mm",
+        "Units;s;mm",
+        "# Einheiten: s mm",
+        "% unit = mm",
+    ] {
+        let line = line.replacen(';', ": ", 1);
+        let said = init("record.csv", format!("{line}\n{rows}").as_bytes(), &[]);
+        assert!(said.contains("`x`: displacement, mm"), "{line}: {said}");
+    }
+    let text = format!("# units: s, mm, N, V\n{rows}");
+    let said = init("record.csv", text.as_bytes(), &[]);
+    assert!(said.contains("the units `s, mm, N, V`"), "{said}");
+}
+
 #[test]
 fn odd_cells_and_lines_are_read_and_said() {
     let plain = table("time (s),position (mm)", |i| {
@@ -103,6 +122,7 @@ fn odd_cells_and_lines_are_read_and_said() {
             format!("{plain}\nMaximum: 1.0\nEnd of data, operator: ab\n"),
         ),
         ("one footer", format!("{plain}# end\nEOF\n")),
+        ("statistics", format!("{plain}Mean,0.1\n\"Std\",2.5\n")),
         (
             "header inside",
             plain.replace("0.40,", "time (s),position (mm)\n0.40,"),

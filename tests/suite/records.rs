@@ -53,7 +53,12 @@ fn motion(
         velocity: 0.0,
     };
     let motion = system.forward(&device, initial, Some(&excitation)).unwrap();
-    motion.displacement.into_iter().step_by(FINE).collect()
+    motion
+        .displacement(0)
+        .iter()
+        .step_by(FINE)
+        .copied()
+        .collect()
 }
 
 /// A model with `experiment` as its only one, mass known or estimated; the folder has `file`.

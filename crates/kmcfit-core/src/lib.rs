@@ -5,7 +5,7 @@
 //! 1. `system`: time grid, integrators, elements; `functions`: from parameters to mass, damping and stiffness at the nodes.
 //! 2. `record`: inputs, channels, sensors, weights; `constraints`: rows and cones in the parameters.
 //! 3. `problem`: system, records, penalties and constraints.
-//! 4. `simulate`: the response, its linearisation and its adjoints, plainly (`reference`) and specialised (`fast`).
+//! 4. `structure`: coordinates, inertias, elements; `step`: their response, its linearisation and its adjoints.
 //! 5. `objective`: the cost of the parameters and its gradient, from one simulation per point.
 //! 6. `qp`: the convex subproblems; without active inequalities by an elimination along time or a sparse factorisation,
 //!    otherwise by Clarabel.
@@ -40,7 +40,7 @@
 //! // Estimated: a line for the mass and a constant damping; the stiffness is known.
 //! let mass = CoefficientSpec::polynomial(&[2.0, 0.0]);
 //! let coefficients = [mass, CoefficientSpec::constant(1.0), CoefficientSpec::fixed(1.0)];
-//! let record = Record::new("free decay").from_state(3.3, 1.0).displacement(&times, &response.displacement);
+//! let record = Record::new("free decay").from_state(3.3, 1.0).displacement(&times, response.displacement(0));
 //! let problem = Builder::new(coefficients).record(record).build()?;
 //! let fit = problem.fit()?;
 //!
@@ -93,11 +93,13 @@ pub use functions::{CoefficientKind, Prior, WeightRule};
 pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, InputErrorKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
-pub use system::{Excitation, Grid, InputQuantity, Method, NodalCoefficients, State, System};
+pub use system::{
+    Excitation, Grid, InputQuantity, Method, NodalCoefficients, StageSamples, State, System,
+};
 // Simulation and cost.
 pub use objective::{Evaluation, Gradient, GradientKind};
-pub use step::{Cause, SimulationError, Trajectory};
-pub use structure::Law;
+pub use step::{Cause, Motion, MotionError, SimulationError, SupportMotion, Trajectory};
+pub use structure::{Ends, Law, Structure, StructureError};
 // Fits.
 pub use solvers::{
     Attempt, Fit, FitSettings, Initial, Optimality, Outcome, QpSolver, Reason, SolveCounts, Solver,

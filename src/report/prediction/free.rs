@@ -50,7 +50,7 @@ impl FreePredictions {
     pub fn summaries(&self) -> Vec<FreeSummary> {
         let pairs = self.responses.iter().zip(&self.bands);
         let summary = |(predicted, band): (&PredictedResponse, &Option<Vec<[f64; 2]>>)| {
-            let y = &predicted.response.displacement;
+            let y = predicted.response.displacement(0);
             let peak = (0..y.len()).max_by(|i, j| y[*i].abs().total_cmp(&y[*j].abs()));
             // The band of the peak is that of its node, as a size.
             let of_size = |i: usize, [low, high]: [f64; 2]| match y[i] < 0.0 {

@@ -224,7 +224,7 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
         Some(PredictionRecord {
             name: found.name,
             times: found.times,
-            displacement: found.response.displacement,
+            displacement: found.response.displacement(0).to_vec(),
             band: found.band,
             envelope: found.worst,
             furthest: (found.furthest)

@@ -124,7 +124,7 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
         ));
     }
     steps.extend(about_patterns(document));
-    steps.extend(about_misfit(document));
+    steps.extend(about_misfit(document, model));
     steps.extend(about_constants(document));
     steps.extend(about_rank(document));
     let in_file = steps.into_iter().map(|step| step.in_file(&model.places));
@@ -228,9 +228,12 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
     let refines = [Solver::GaussNewton, Solver::ProjectedGradient];
     let is_refined = refines.iter().any(|solver| model.method == solver.name());
     let is_automatic = |f: &Finding| f.kind.starts_with("nodes_from");
-    let automatic = is_refined
-        && model.parameters <= FEW_PARAMETERS
-        && !document.automatic.iter().any(is_automatic);
+    let is_chosen = document.automatic.iter().any(is_automatic);
+    // The steps of a chosen grid are not why a model does not fit.
+    if is_chosen && document.worst_fit().is_some_and(is_poor) {
+        return None;
+    }
+    let automatic = is_refined && model.parameters <= FEW_PARAMETERS && !is_chosen;
     let nodes = match automatic {
         true => "auto".to_owned(),
         false => (2 * model.nodes - 1).to_string(),

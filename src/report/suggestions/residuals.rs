@@ -1,10 +1,12 @@
 //! Suggestions from the size and the patterns of the residuals.
 
 use super::{Suggestion, is_poor, number_of, of_channel, percent};
+use crate::config::Model;
 use crate::number_format::{significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
-use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
+use kmcfit_core::internals::diagnostics::{SIGNIFICANCE, standard_deviation};
+use kmcfit_core::internals::record::Channel;
 use kmcfit_core::internals::solvers::StartStrategy;
 
 /// Residuals with a lower probability under white noise have a pattern.
@@ -97,7 +99,7 @@ fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPatter
 }
 
 /// Suggestions for the first channel that is fitted poorly.
-pub(super) fn about_misfit(document: &ResultDocument) -> Vec<Suggestion> {
+pub(super) fn about_misfit(document: &ResultDocument, model: &Model) -> Vec<Suggestion> {
     let records = document.experiments.iter().enumerate();
     let mut named = records.flat_map(|(i, e)| e.channels.iter().map(move |c| (i, e, c)));
     let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
@@ -128,7 +130,22 @@ pub(super) fn about_misfit(document: &ResultDocument) -> Vec<Suggestion> {
             ),
         )];
     }
-    of_record(document, i, record)
+    of_record(document, i, record, model)
+}
+
+/// Root mean square of the last quarter of a channel, as a share of that of the first, below which a record is a decay.
+const DECAYED: f64 = 0.5;
+
+/// True for a record whose motion decays in all channels: no force acts that lasts.
+fn is_decay(model: &Model, i: usize) -> bool {
+    let channels = model.problem.experiments.get(i).map(|e| e.channels.iter());
+    let decays = |channel: &Channel| {
+        let values = channel.observed();
+        let quarter = values.len() / 4;
+        let spread = |part: &[f64]| standard_deviation(part);
+        spread(&values[values.len() - quarter..]) < DECAYED * spread(&values[..quarter])
+    };
+    channels.is_some_and(|mut channels| channels.all(decays))
 }
 
 fn is_coloured(channel: &ChannelSummary) -> bool {
@@ -163,7 +180,12 @@ fn equation_of_motion(
 }
 
 /// Changes of the start, the sensors and the method for a record that the fit does not explain.
-fn of_record(document: &ResultDocument, i: usize, record: &ExperimentSummary) -> Vec<Suggestion> {
+fn of_record(
+    document: &ResultDocument,
+    i: usize,
+    record: &ExperimentSummary,
+    model: &Model,
+) -> Vec<Suggestion> {
     let name = &record.name;
     let mut steps = Vec::new();
     let start = StartStrategy::StartValues.name();
@@ -177,7 +199,7 @@ fn of_record(document: &ResultDocument, i: usize, record: &ExperimentSummary) ->
     }
     let Some(drive) = record.driven_by.first() else {
         let worst = (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
-        if worst < HARDLY && document.is_simulated() {
+        if worst < HARDLY && document.is_simulated() && !is_decay(model, i) {
             steps.push(Suggestion::change(
                 "equation_of_motion",
                 "if an unmeasured force acts, fit the equation of motion",

@@ -1,6 +1,6 @@
 //! Loss of an input by lines between its samples.
 //!
-//! Lines between equally spaced samples pass a sine of frequency `f` by the factor `sinc(f dt)^2` with `sinc(x) = sin(pi x) / (pi x)`. A response
+//! Lines between samples, equally spaced as most are, pass a sine of frequency `f` by the factor `sinc(f dt)^2` with `sinc(x) = sin(pi x) / (pi x)`. A response
 //! near its natural frequency shows the input there: the coefficients have lost the same share, and short pulses lose more. What the estimates
 //! have lost is seen by a second interpolation: the predictions with cubic splines, less those with lines, shift the estimates by one
 //! Gauss-Newton step.
@@ -13,7 +13,7 @@ use super::median_frequency::median_frequency;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{BaseMotion, Input, Waveform};
-use crate::signal::{Interpolation, Signal, even_spacing};
+use crate::signal::{Interpolation, Signal, median_spacing};
 use crate::system::InputQuantity;
 use std::f64::consts::PI;
 
@@ -32,7 +32,7 @@ pub(super) fn interpolation_losses(
     let each = each.filter_map(|(e, experiment)| {
         let is_open = !is_white || experiment.input_error.is_some();
         let (input, cubic) = is_open.then(|| with_cubics(problem, e)).flatten()?;
-        let cycles = frequency? * even_spacing(cubic.times())?;
+        let cycles = frequency? * median_spacing(cubic.times());
         let errors = shift_by(problem, theta, evaluation, e, (input, cubic))?;
         (errors > NOTICEABLE).then(|| FitWarning::InterpolationLoss {
             experiment: experiment.name.clone(),

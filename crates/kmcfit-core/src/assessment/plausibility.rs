@@ -431,7 +431,7 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
             continue;
         };
         let mass = &evaluation.nodal_of(experiment.coefficient_set).mass;
-        let inertia = response.velocity.windows(2).zip(mass);
+        let inertia = response.velocity(0).windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
             warnings.push(FitWarning::NegligibleForce {

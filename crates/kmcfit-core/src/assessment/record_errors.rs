@@ -63,7 +63,9 @@ pub(super) fn small_error(
         }
         RecordParameter::Gain(e, c) => {
             let (gain, fitted) = with_best_gain(problem, theta, e, c, 1.0 + value)?;
-            (fitted.is_white() && is_factor(gain)).then(|| factor(problem, e, c, gain))
+            // A refit that leaves the estimate of the test has a scale that nothing determines.
+            let is_near = (0.5..=2.0).contains(&(gain / (1.0 + value)));
+            (fitted.is_white() && is_near && is_factor(gain)).then(|| factor(problem, e, c, gain))
         }
     }
 }

@@ -374,7 +374,7 @@ struct Response {
 impl Response {
     fn of(problem: &Problem, evaluation: &Evaluation) -> Option<Self> {
         let longest = (evaluation.trajectories.iter()).max_by_key(|response| response.nodes())?;
-        let (y, v) = (&longest.displacement, &longest.velocity);
+        let (y, v) = (longest.displacement(0), longest.velocity(0));
         let size = |values: &[f64]| crate::simd::sum::rms(values);
         let frequency = size(v) / size(y);
         (frequency.is_finite() && frequency > 0.0).then_some(())?;

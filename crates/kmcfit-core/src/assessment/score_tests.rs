@@ -233,7 +233,7 @@ fn refit(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> Option<Refi
 /// Kinds and terms that the model does not have.
 fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKind, Law)> {
     let speeds: Vec<f64> = (evaluation.trajectories.iter())
-        .flat_map(|response| response.velocity.iter().copied())
+        .flat_map(|response| response.velocity(0).iter().copied())
         .collect();
     let width = WIDTH * rms(&speeds);
     let set = problem.functions.coefficient_set(0);
@@ -262,7 +262,7 @@ fn constants(
 /// Root mean square of `phi` of a term over all records.
 fn force(evaluation: &Evaluation, term: Law) -> f64 {
     let of = |response: &Trajectory| -> Vec<f64> {
-        let states = response.displacement.iter().zip(&response.velocity);
+        let states = response.displacement(0).iter().zip(response.velocity(0));
         states.map(|(y, v)| term.phi(*y, *v)).collect()
     };
     let all: Vec<f64> = evaluation.trajectories.iter().flat_map(of).collect();
@@ -281,7 +281,7 @@ fn largest_force(problem: &Problem, evaluation: &Evaluation) -> f64 {
             else {
                 continue;
             };
-            let states = response.displacement.iter().zip(&response.velocity);
+            let states = response.displacement(0).iter().zip(response.velocity(0));
             all.extend((states.zip(values)).map(|((y, v), p)| p * term.phi(*y, *v)));
         }
         largest = largest.max(rms(&all));

@@ -65,7 +65,7 @@ impl Problem {
             own_nodal: vec![self.functions.empty_nodal(); nodal_sets - 1],
             scalars: vec![0.0; self.functions.scalars().len()],
             trajectories: (self.experiments.iter())
-                .map(|e| Trajectory::zeros(e.nodes))
+                .map(|e| Trajectory::zeros(1, e.nodes))
                 .collect(),
             predictions: (self.experiments.iter())
                 .map(|e| vec![Vec::new(); e.channels.len()])

@@ -136,9 +136,14 @@ impl Kernel for AddTranspose<'_, '_> {
                 arithmetic,
                 push,
                 by_y,
-                &mut source.displacement[nodes.clone()],
+                &mut source.component_mut(0)[nodes.clone()],
             );
-            add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
+            add_products(
+                arithmetic,
+                push,
+                by_v,
+                &mut source.component_mut(1)[nodes.clone()],
+            );
             match direct {
                 CoefficientGradient::AtNodes(nodal) => {
                     for (values, by) in nodal.functions_mut().zip(&observed.functions) {

@@ -128,7 +128,7 @@ impl Channel {
             self.place(view, i).as_node(),
             self.base().is_empty(),
         ) {
-            (ChannelKind::Displacement, Some(node), true) => view.response.displacement[node],
+            (ChannelKind::Displacement, Some(node), true) => view.response.displacement(0)[node],
             _ => self.value_at(view, i, self.place(view, i)),
         }
     }
@@ -144,7 +144,7 @@ impl Channel {
     pub fn predict_into(&self, view: SimulatedRecord, out: &mut Vec<f64>) {
         out.clear();
         if self.is_on_every_node() && self.is_plain() {
-            out.extend_from_slice(&view.response.displacement[..self.len()]);
+            out.extend_from_slice(&view.response.displacement(0)[..self.len()]);
             return;
         }
         if self.is_acceleration_on_nodes() {
@@ -199,7 +199,7 @@ impl Channel {
             }
         };
         if self.is_on_every_node() && self.is_plain() {
-            let pairs = source.displacement.iter_mut().zip(slopes);
+            let pairs = source.component_mut(0).iter_mut().zip(slopes);
             pairs.for_each(|(source, slope)| *source += slope);
             return;
         }
@@ -218,7 +218,7 @@ impl Channel {
         for (i, slope) in slopes.iter().enumerate() {
             let place = self.place(view, i);
             if let (true, Some(node)) = (simple, place.as_node()) {
-                source.displacement[node] += gain * slope;
+                source.component_mut(0)[node] += gain * slope;
                 continue;
             }
             let sensed = self.sensed(view, i);
@@ -231,7 +231,7 @@ impl Channel {
 
 /// Directional derivative of an observation.
 fn answer(sensed: &Observation, step: usize, along: RecordTangent) -> f64 {
-    let (y, v) = (&along.response.displacement, &along.response.velocity);
+    let (y, v) = (along.response.displacement(0), along.response.velocity(0));
     let by_states = sensed.states[0] * y[step]
         + sensed.states[1] * v[step]
         + sensed.states[2] * y[step + 1]
@@ -257,8 +257,8 @@ fn spread(
     direct: &mut CoefficientGradient,
 ) {
     for side in 0..2 {
-        source.displacement[step + side] += slope * sensed.states[2 * side];
-        source.velocity[step + side] += slope * sensed.states[2 * side + 1];
+        source.component_mut(0)[step + side] += slope * sensed.states[2 * side];
+        source.component_mut(1)[step + side] += slope * sensed.states[2 * side + 1];
     }
     for f in 0..direct.functions() {
         for side in 0..2 {

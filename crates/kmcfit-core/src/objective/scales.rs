@@ -92,7 +92,7 @@ impl Problem {
 
 /// Sums over the nodes of `y''^2` and of `phi^2` of each term.
 fn squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
-    let (y, v) = (&response.displacement, &response.velocity);
+    let (y, v) = (response.displacement(0), response.velocity(0));
     let nodes = y.len();
     if nodes <= LONG_RECORD_STEPS {
         return sequential_squares(response, terms, step);
@@ -111,7 +111,7 @@ fn squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
 /// interleaved, because each sum is a chain of dependent operations.
 fn sequential_squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
     const PART: usize = 256;
-    let (y, v) = (&response.displacement, &response.velocity);
+    let (y, v) = (response.displacement(0), response.velocity(0));
     let mut sums = vec![0.0; terms.len() + 1];
     let mut part = [[0.0; PART]; 4];
     for (first, sums) in (0..).step_by(4).zip(sums.chunks_mut(4)) {

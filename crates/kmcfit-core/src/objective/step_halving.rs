@@ -100,7 +100,7 @@ impl Problem {
             };
             let nodal = halved(nodal, steps);
             let excitation = part.excitation.as_ref();
-            let mut response = Trajectory::zeros(part.nodes);
+            let mut response = Trajectory::zeros(1, part.nodes);
             let driven = Driven {
                 system: &system,
                 nodal: &nodal,
@@ -124,8 +124,8 @@ impl Problem {
                 predicted.extend(channel.predict(view));
             }
             state = State {
-                displacement: response.displacement[part.nodes - 1],
-                velocity: response.velocity[part.nodes - 1],
+                displacement: response.displacement(0)[part.nodes - 1],
+                velocity: response.velocity(0)[part.nodes - 1],
             };
             first = end;
         }

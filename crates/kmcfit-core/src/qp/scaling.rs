@@ -74,8 +74,8 @@ impl ScaledProgram {
     }
 
     /// True if a point of the original program is near enough for its rows and cost to be computed with the accuracy of constraints
-    /// ([`TOLERANCE`]): farther out along a direction without cost, the rounding errors of a row's terms exceed that share of the largest bound, and
-    /// residuals relative to the terms are small at any point.
+    /// ([`TOLERANCE`]): farther out along a direction without cost, the rounding errors of a row's terms exceed that share of the largest bound, or
+    /// of the largest distance at which a residual vanishes, and residuals relative to the terms are small at any point.
     pub fn resolves(&self, z: &[f64]) -> bool {
         let rows = [
             &self.sub.equalities,
@@ -84,7 +84,11 @@ impl ScaledProgram {
         ];
         let bounds = rows.into_iter().flat_map(|rows| rows.right());
         let bounds = bounds.chain(&self.sub.upper).map(|bound| bound.abs());
-        let largest = bounds.filter(|bound| bound.is_finite()).fold(1.0, f64::max);
+        // Where all bounds are zero, the residuals alone say how far from zero a point is.
+        let targets = self.sub.residuals.right().iter().enumerate();
+        let distances = targets.map(|(i, f)| f.abs() / self.sub.residuals.scale(i));
+        let sizes = bounds.chain(distances);
+        let largest = sizes.filter(|size| size.is_finite()).fold(1.0, f64::max);
         let mut sizes = z.iter().zip(&self.units).map(|(z, unit)| (z / unit).abs());
         sizes.all(|size| ROUNDING * size <= TOLERANCE * largest)
     }
@@ -193,5 +197,17 @@ mod tests {
         let at = |z: f64| [(z + 1.0) * units[0], z * units[1]];
         assert!(normalised.resolves(&at(1e3)));
         assert!(!normalised.resolves(&at(1e12)));
+    }
+
+    /// `z_1 <= z_2` with residuals that vanish at 1e9: there is no smaller size.
+    #[test]
+    fn points_where_the_residuals_vanish_are_resolved() {
+        let mut sub = Subproblem::new(2);
+        sub.bound([(0, 1.0), (1, -1.0)], f64::NEG_INFINITY, 0.0);
+        sub.residuals.push([(0, 1.0)], 1e9);
+        sub.residuals.push([(1, 1.0)], 1e9);
+        let normalised = ScaledProgram::new(&sub);
+        assert!(normalised.resolves(&[1e9, 1e9]));
+        assert!(!normalised.resolves(&[1e18, 1e18]));
     }
 }

@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 pub(crate) struct CountedEvaluator<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
-    mode: EngineMode,
+    pub mode: EngineMode,
     /// Step at which the record is divided in two, for gradients from tangent solves without an adjoint.
     halfway: Option<usize>,
     /// Iteration limit of a quadratic program.

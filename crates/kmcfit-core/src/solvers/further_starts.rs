@@ -11,7 +11,9 @@ use super::fit::{Attempt, Fit};
 use super::observer::Observer;
 use super::rounds::{is_ended, with_round};
 use super::settings::{FitSettings, Solver, StartStrategy};
+use super::start_strategy::PROBING_ITERATIONS;
 use super::starts::scan_start;
+use super::termination::Status;
 use super::timings::timed;
 use crate::functions::CoefficientKind;
 use crate::host::Instant;
@@ -115,7 +117,9 @@ impl FurtherStarts<'_, '_> {
         } = *self;
         self.watch.begin_attempt(strategy);
         let from = problem.feasible_or(from.to_vec(), &self.found.best.parameters);
-        let next = match search(problem, &from, settings, None, self.watch) {
+        let mut probing = settings.clone();
+        probing.stopping.iterations = settings.stopping.iterations.min(PROBING_ITERATIONS);
+        let mut next = match search(problem, &from, &probing, None, self.watch) {
             Ok(next) => next,
             Err(breakdown) => {
                 self.found
@@ -124,6 +128,12 @@ impl FurtherStarts<'_, '_> {
                 return Ok(());
             }
         };
+        let is_lower = next.best.evaluation.cost < self.found.best.evaluation.cost;
+        if is_lower && next.outcome.status == Status::MaxIterations {
+            let start = next.best.parameters.clone();
+            let rest = search(problem, &start, settings, None, self.watch)?;
+            next = with_round(next, rest, false);
+        }
         self.found.attempts.push(Attempt::of(strategy, &next));
         let found = self.found.clone();
         let outcome = next.outcome.clone();

@@ -42,7 +42,7 @@ impl ResponseSnapshot {
         let of = |(experiment, response): (&Experiment, &Trajectory)| {
             let mut channels = experiment.channels.iter();
             match channels.any(|c| c.kind() == ChannelKind::Displacement) {
-                true => response.displacement.clone(),
+                true => response.displacement(0).to_vec(),
                 false => Vec::new(),
             }
         };

@@ -27,7 +27,7 @@ use std::time::Duration;
 /// fit in between costs another attempt.
 const EXPLAINED: f64 = 1e-3;
 /// Iteration limit of an attempt; Gauss–Newton from a good start takes about ten.
-const PROBING_ITERATIONS: u64 = 60;
+pub(super) const PROBING_ITERATIONS: u64 = 60;
 /// Fits `problem` from `start`; `observe` is called after every iteration.
 ///
 /// Gauss–Newton tries starting points until a fit explains the record and returns the fit with the lowest cost. The other

@@ -8,7 +8,7 @@ use super::stage::{DUFFING, Drive, LINEAR, Model};
 use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{CoefficientGradient, Trajectory};
 use crate::simd;
-use crate::structure::{Element, Law, MOST_ELEMENTS};
+use crate::structure::{Law, Link, MOST_ELEMENTS};
 use crate::system::{
     Excitation, FUNCTIONS, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
 };
@@ -54,7 +54,7 @@ pub struct Driven<'a> {
 macro_rules! with_model {
     ($driven:expr, $model:ident => $call:expr) => {{
         let driven: Driven = $driven;
-        let mut list = [Element::grounded(Law::Offset); MOST_ELEMENTS];
+        let mut list = [Link::grounded(Law::Offset); MOST_ELEMENTS];
         let laws = driven.system.terms.iter();
         let filled = list
             .iter_mut()
@@ -82,6 +82,7 @@ macro_rules! with_model {
                 let $model = driven.model::<MOST_ELEMENTS, 4>(&RK4, list);
                 $call
             }
+            (Method::ImplicitMidpoint, _) => unreachable!("steps of assembled structures"),
         }
     }};
 }
@@ -117,7 +118,7 @@ impl<'a> Driven<'a> {
     fn model<'b, const E: usize, const S: usize>(
         self,
         tableau: &'b Tableau<S>,
-        list: &'b [Element],
+        list: &'b [Link],
     ) -> Model<'b, 1, E, S>
     where
         'a: 'b,
@@ -158,12 +159,12 @@ impl<'a> Driven<'a> {
         let in_order = mode.is_in_paper_order(self.system, self.excitation, nodes);
         let is_linear = self.system.terms.iter().all(|law| law.is_linear());
         let x = [[initial.displacement], [initial.velocity]];
-        let Trajectory {
-            displacement,
-            velocity,
-        } = &mut *trajectory;
-        let states = [[displacement.as_mut_slice()], [velocity.as_mut_slice()]];
-        with_model!(self.require(nodes), model => match (in_order, is_linear) {
+        let driven = self.require(nodes);
+        if self.system.method == Method::ImplicitMidpoint {
+            return driven.respond_assembled(initial, trajectory);
+        }
+        let states = trajectory.columns_mut();
+        with_model!(driven, model => match (in_order, is_linear) {
             (true, _) => in_paper_order(model, x, states),
             (false, true) => simd::run(Linear { model, x, states }),
             (false, false) => simd::run(Prepared { model, x, states }),
@@ -181,15 +182,19 @@ impl<'a> Driven<'a> {
         source: &Trajectory,
         gradient: CoefficientGradient,
     ) -> State {
+        let driven = self.require(trajectory.nodes());
+        if self.system.method == Method::ImplicitMidpoint {
+            return driven.adjoint_assembled(trajectory, source, gradient);
+        }
         let gradient = match gradient {
             CoefficientGradient::AtNodes(nodal) => {
                 Gradient::AtNodes(nodal.functions_mut().map(Vec::as_mut_slice).collect())
             }
             CoefficientGradient::Summed(sums) => Gradient::Summed(sums),
         };
-        let states = [[trajectory.displacement.as_slice()], [&trajectory.velocity]];
-        let source = [[source.displacement.as_slice()], [&source.velocity]];
-        let [[displacement], [velocity]] = with_model!(self.require(trajectory.nodes()), model => {
+        let states = [[trajectory.displacement(0)], [trajectory.velocity(0)]];
+        let source = [[source.displacement(0)], [source.velocity(0)]];
+        let [[displacement], [velocity]] = with_model!(driven, model => {
             simd::run(Adjoint { model, states, source, gradient })
         });
         State {
@@ -214,7 +219,10 @@ impl<'a> Driven<'a> {
         wanted: &Wanted<FUNCTIONS>,
         maps: &mut Maps,
     ) {
-        let states = [[trajectory.displacement.as_slice()], [&trajectory.velocity]];
+        let states = [[trajectory.displacement(0)], [trajectory.velocity(0)]];
+        if self.system.method == Method::ImplicitMidpoint {
+            return self.linearise_assembled(trajectory, from, maps);
+        }
         with_model!(self, model => {
             simd::run(Linearise { model, states, from, wanted, maps });
         });
@@ -223,9 +231,9 @@ impl<'a> Driven<'a> {
     /// Directional derivative of the response along `direction`.
     pub fn tangent(self, trajectory: &Trajectory, direction: &SystemTangent) -> Trajectory {
         let functions: Vec<&[f64]> = direction.nodal.functions().collect();
-        let mut out = Trajectory::zeros(trajectory.nodes());
+        let mut out = Trajectory::zeros(1, trajectory.nodes());
         let mut x = [direction.initial.displacement, direction.initial.velocity];
-        (out.displacement[0], out.velocity[0]) = (x[0], x[1]);
+        out.write(0, &x);
         self.each_step(trajectory, false, |i, maps, l| {
             let mut change = [0.0; 2];
             for (end, change) in change.iter_mut().enumerate() {
@@ -236,7 +244,7 @@ impl<'a> Driven<'a> {
                 *change += maps.growth[end][0][l] * x[0] + maps.growth[end][1][l] * x[1];
             }
             x = [x[0] + change[0], x[1] + change[1]];
-            (out.displacement[i + 1], out.velocity[i + 1]) = (x[0], x[1]);
+            out.write(i + 1, &x);
         });
         out
     }
@@ -279,7 +287,7 @@ impl System {
         initial: State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
-        let mut trajectory = Trajectory::zeros(self.grid.nodes());
+        let mut trajectory = Trajectory::zeros(1, self.grid.nodes());
         let driven = Driven {
             system: self,
             nodal,

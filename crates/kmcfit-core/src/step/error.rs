@@ -13,6 +13,8 @@ pub enum Cause {
     Mass,
     /// The response exceeds the floating-point range.
     Overflow,
+    /// Newton's method does not solve an implicit step.
+    NoConvergence,
     /// The square of a residual exceeds the floating-point range.
     CostOverflow,
 }
@@ -40,6 +42,9 @@ impl SimulationError {
                 significant(value, 6)
             ),
             Cause::Overflow => format!("the response overflows at t = {time} s"),
+            Cause::NoConvergence => {
+                format!("Newton's method does not solve the implicit step from t = {time} s")
+            }
             Cause::CostOverflow => {
                 format!("the cost overflows: the residual at t = {time} s is {value:.3e}")
             }
@@ -67,14 +72,14 @@ pub(super) fn require_finite(grid: &Grid, trajectory: &Trajectory) -> Result<(),
     if trajectory.is_finite() {
         return Ok(());
     }
-    let finite =
-        |i: usize| trajectory.displacement[i].is_finite() && trajectory.velocity[i].is_finite();
-    let node = (0..trajectory.nodes()).find(|&i| !finite(i)).unwrap_or(0);
-    let last = trajectory.displacement[node.saturating_sub(1)];
+    let node = (0..trajectory.nodes())
+        .find(|&i| !trajectory.is_finite_at(i))
+        .unwrap_or(0);
+    let last = trajectory.displacement(0)[node.saturating_sub(1)];
     Err(at(grid, Cause::Overflow, node, last))
 }
 
-fn at(grid: &Grid, cause: Cause, node: usize, value: f64) -> SimulationError {
+pub(super) fn at(grid: &Grid, cause: Cause, node: usize, value: f64) -> SimulationError {
     SimulationError {
         cause,
         node,

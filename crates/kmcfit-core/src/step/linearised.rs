@@ -3,7 +3,7 @@
 use super::stage::{EightSteps, Model, Pair, Reciprocal, Stage, Stages, eight, increment};
 use super::tableau::Tableau;
 use crate::simd::{Arithmetic, Eight, Real, Row};
-use crate::structure::Element;
+use crate::structure::Link;
 
 /// Block matrix `[[qq, qv], [vq, vv]]`.
 pub(crate) type Blocks<T, const N: usize> = [[[[T; N]; N]; 2]; 2];
@@ -194,7 +194,7 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Linearised<E
         &self,
         s: usize,
         e: usize,
-        element: Element,
+        element: Link,
         across: Eight<A>,
         bar: &mut Pair<Eight<A>, N>,
     ) {

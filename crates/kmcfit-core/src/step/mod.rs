@@ -11,6 +11,7 @@
 //! | `paper` | Eq. 13 and 15-17, as the paper writes them |
 //! | `observation`, `nodal_observations` | displacement, velocity and acceleration at any time |
 //! | `engine` | these operations on a system of one coordinate |
+//! | `assembled` | the same for structures of any size, with general rows, moving supports and implicit steps |
 //!
 //! What is local to a step is computed for eight steps in SIMD lanes, what depends on the step before by products of small matrices. A
 //! number type implements [`Real`](crate::simd::Real), a method is a `Tableau`.
@@ -21,6 +22,7 @@
 )]
 
 mod adjoint;
+mod assembled;
 mod engine;
 mod error;
 mod gradient;
@@ -41,6 +43,7 @@ mod tests;
 mod trajectory;
 mod trials;
 
+pub use assembled::{Motion, MotionError, SupportMotion};
 pub use engine::{Driven, EngineMode};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
 pub use error::{Cause, SimulationError};
@@ -48,7 +51,7 @@ pub use gradient::CoefficientGradient;
 pub use observation::{Observation, observe, observe_value};
 pub use paper::continuous_adjoint;
 pub(crate) use stage::eight;
-pub use step_jacobian::StepJacobian;
+pub use step_jacobian::StepJacobians;
 pub use trajectory::Trajectory;
 pub(crate) use trials::SearchRay;
 

@@ -46,8 +46,8 @@ impl NodalObservations<'_> {
         out: &mut Accelerations,
     ) {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
-        let y = eight(arithmetic, &self.states.displacement, i);
-        let v = eight(arithmetic, &self.states.velocity, i);
+        let y = eight(arithmetic, self.states.displacement(0), i);
+        let v = eight(arithmetic, self.states.velocity(0), i);
         let inverse_mass = one / eight(arithmetic, &self.nodal.mass, i);
         let minus_inverse_mass = -inverse_mass;
         let mut push = force;

@@ -116,7 +116,7 @@ fn hermite(x: f64, h: f64) -> [f64; 4] {
 
 #[inline(always)]
 fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
-    let (y, v, i) = (&states.displacement, &states.velocity, place.step);
+    let (y, v, i) = (states.displacement(0), states.velocity(0), place.step);
     match place.fraction {
         0.0 => Observation::state(0, y[i]),
         1.0 => Observation::state(2, y[i + 1]),
@@ -134,7 +134,7 @@ fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
 
 #[inline(always)]
 fn velocity(driven: Driven, states: &Trajectory, place: TimePoint) -> Observation {
-    let (y, v, i) = (&states.displacement, &states.velocity, place.step);
+    let (y, v, i) = (states.displacement(0), states.velocity(0), place.step);
     match place.fraction {
         0.0 => Observation::state(1, v[i]),
         1.0 => Observation::state(3, v[i + 1]),

@@ -61,7 +61,7 @@ impl<'a> AdjointEquation<'a> {
         let [c, k] = linearised_coefficients(system, nodal, trajectory);
         let m = nodal.mass.as_slice();
         let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
-        let y = trajectory.displacement.as_slice();
+        let y = trajectory.displacement(0);
         let functions = [
             m.into(),
             m1.into(),
@@ -110,7 +110,7 @@ impl<'a> AdjointEquation<'a> {
         trajectory: &Trajectory,
         adjoint: &Adjoint,
     ) -> SystemTangent {
-        let (y, v) = (&trajectory.displacement, &trajectory.velocity);
+        let (y, v) = (trajectory.displacement(0), trajectory.velocity(0));
         let z = &adjoint.displacement;
         let mut acceleration = curvature(y, self.dt);
         if let Some(base) = excitation.and_then(|e| e.base.as_ref()) {
@@ -164,7 +164,8 @@ fn linearised_coefficients<'a>(
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
     for (term, p) in system.terms.iter().zip(&nodal.coefficients) {
         for i in 0..nodes {
-            let [by_y, by_v] = term.slopes(trajectory.displacement[i], trajectory.velocity[i]);
+            let [by_y, by_v] =
+                term.slopes(trajectory.displacement(0)[i], trajectory.velocity(0)[i]);
             c[i] += p[i] * by_v.unwrap_or(0.0);
             k[i] += p[i] * by_y.unwrap_or(0.0);
         }

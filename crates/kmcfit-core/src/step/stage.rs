@@ -2,7 +2,7 @@
 
 use super::tableau::{At, Tableau};
 use crate::simd::{Arithmetic, Eight, Real, window};
-use crate::structure::{Element, Law};
+use crate::structure::{Law, Link};
 
 /// Displacements and velocities of the coordinates.
 pub(crate) type Pair<T, const N: usize> = [[T; N]; 2];
@@ -22,7 +22,7 @@ pub(crate) struct Drive<'a> {
 pub(crate) struct Model<'a, const N: usize, const E: usize, const S: usize> {
     pub tableau: &'a Tableau<S>,
     /// See [`Model::elements`].
-    pub list: &'a [Element],
+    pub list: &'a [Link],
     /// Nodal values.
     pub masses: [&'a [f64]; N],
     /// Nodal values; empty for zero.
@@ -34,22 +34,19 @@ pub(crate) struct Model<'a, const N: usize, const E: usize, const S: usize> {
 }
 
 /// One coordinate with a damper and a spring.
-pub(crate) const LINEAR: &[Element] = &[
-    Element::grounded(Law::Damping),
-    Element::grounded(Law::Stiffness),
-];
+pub(crate) const LINEAR: &[Link] = &[Link::grounded(Law::Damping), Link::grounded(Law::Stiffness)];
 /// The same with a cubic spring.
-pub(crate) const DUFFING: &[Element] = &[
-    Element::grounded(Law::Damping),
-    Element::grounded(Law::Stiffness),
-    Element::grounded(Law::CubicStiffness),
+pub(crate) const DUFFING: &[Link] = &[
+    Link::grounded(Law::Damping),
+    Link::grounded(Law::Stiffness),
+    Link::grounded(Law::CubicStiffness),
 ];
 
 impl<'a, const N: usize, const E: usize, const S: usize> Model<'a, N, E, S> {
     /// The elements. Two and three of one coordinate are [`LINEAR`] and [`DUFFING`], known to the compiler, which unrolls their loops; any
     /// other list has room for [`MOST_ELEMENTS`](crate::structure::MOST_ELEMENTS).
     #[inline(always)]
-    pub fn elements(&self) -> &'a [Element] {
+    pub fn elements(&self) -> &'a [Link] {
         match (N, E) {
             (1, 2) => LINEAR,
             (1, 3) => DUFFING,
@@ -227,7 +224,7 @@ impl<T: Real, M: Inertia<T>, const N: usize, const E: usize> Stage<T, M, N, E> {
     /// Accelerations `(f - sum_e row_e p_e phi_e)/m - b''` and the forces `phi_e`, in the paper's order: quotients one by one, elements
     /// backwards (the spring before the damper).
     #[inline(always)]
-    pub fn accelerations(&self, elements: &[Element], q: &[T; N], v: &[T; N]) -> ([T; N], [T; E]) {
+    pub fn accelerations(&self, elements: &[Link], q: &[T; N], v: &[T; N]) -> ([T; N], [T; E]) {
         let zero = q[0].like(0.0);
         let (mut a, mut all) = ([zero; N], [zero; E]);
         if let Some([forces, _]) = &self.drives {
@@ -255,7 +252,7 @@ impl<T: Real, M: Inertia<T>, const N: usize, const E: usize> Stage<T, M, N, E> {
 
     /// Derivatives of the elements' forces with respect to elongation and rate; `None` for zero.
     #[inline(always)]
-    pub fn slopes(&self, elements: &[Element], q: &[T; N], v: &[T; N]) -> [[Option<T>; 2]; E] {
+    pub fn slopes(&self, elements: &[Link], q: &[T; N], v: &[T; N]) -> [[Option<T>; 2]; E] {
         let mut all = [[None; 2]; E];
         for (e, element) in elements.iter().enumerate().take(E) {
             let slopes = element.law.slopes(element.across(q), element.across(v));
@@ -272,7 +269,7 @@ impl<T: Real, M: Inertia<T>, const N: usize, const E: usize> Stage<T, M, N, E> {
     #[inline(always)]
     pub fn matrices(
         &self,
-        elements: &[Element],
+        elements: &[Link],
         slopes: &[[Option<T>; 2]; E],
         matrices: &mut [[[T; N]; N]; 2],
         zero: T,
@@ -347,7 +344,7 @@ pub(crate) fn increment<T: Real, const N: usize, const S: usize>(
 /// The equation of motion in one step.
 struct Motion<'a, V, T, M, const E: usize, const S: usize> {
     tableau: &'a Tableau<S>,
-    elements: &'a [Element],
+    elements: &'a [Link],
     values: &'a V,
     number: std::marker::PhantomData<(T, M)>,
 }
@@ -367,7 +364,7 @@ impl<T: Real, V: Values<T, N>, M: Inertia<T>, const N: usize, const E: usize, co
 #[inline(always)]
 pub(crate) fn step<T: Real, M: Inertia<T>, const N: usize, const E: usize, const S: usize>(
     tableau: &Tableau<S>,
-    elements: &[Element],
+    elements: &[Link],
     dt: f64,
     values: &impl Values<T, N>,
     x: &Pair<T, N>,

@@ -2,67 +2,109 @@
 
 use super::Trajectory;
 use super::engine::{Driven, Maps};
-use crate::system::{InputQuantity, State};
+use crate::system::InputQuantity;
 
-/// Change of the state `(y, v)` at the right node of a step.
-pub type StateChange = [f64; 2];
-
-/// One step `x_{i+1} = Phi_i(x_i, p)` and its derivatives; functions in the order of
+/// The steps `x_{i+1} = Phi_i(x_i, p)` of a record and their derivatives; functions in the order of
 /// [`NodalCoefficients::functions`](crate::system::NodalCoefficients::functions), mass first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StepJacobian {
-    /// `Phi_i`: displacement and velocity at the right node.
-    pub end: State,
-    /// Derivatives with respect to the displacement and to the velocity at the left node.
-    pub state: [StateChange; 2],
-    /// Derivatives with respect to each function's value at the left node.
-    pub left: Vec<StateChange>,
-    /// Derivatives with respect to each function's value at the right node.
-    pub right: Vec<StateChange>,
+pub struct StepJacobians {
+    components: usize,
+    functions: usize,
+    /// For each step `Phi_i`, then its derivatives by the components at the left node, by each function's value at the left node, and by
+    /// each function's value at the right node.
+    values: Vec<f64>,
 }
 
-/// Derivatives of a step with respect to the state at its left node.
-fn by_state(maps: &Maps, l: usize) -> [StateChange; 2] {
-    let [[yy, yv], [vy, vv]] = &maps.growth;
-    [[1.0 + yy[l], vy[l]], [yv[l], 1.0 + vv[l]]]
+/// One step: values and derivatives of all components of the state at its right node.
+#[derive(Debug, Clone, Copy)]
+pub struct StepJacobian<'a> {
+    components: usize,
+    functions: usize,
+    values: &'a [f64],
+}
+
+impl StepJacobians {
+    /// All steps in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = StepJacobian<'_>> {
+        let rows = 1 + self.components + 2 * self.functions;
+        let steps = self.values.chunks_exact(rows * self.components);
+        steps.map(|values| StepJacobian {
+            components: self.components,
+            functions: self.functions,
+            values,
+        })
+    }
+}
+
+impl StepJacobian<'_> {
+    fn row(&self, row: usize, end: usize) -> f64 {
+        self.values[row * self.components + end]
+    }
+
+    /// Component `end` of `Phi_i`.
+    pub fn end(&self, end: usize) -> f64 {
+        self.row(0, end)
+    }
+
+    /// Derivative of component `end` by component `start` at the left node.
+    pub fn by_state(&self, start: usize, end: usize) -> f64 {
+        self.row(1 + start, end)
+    }
+
+    /// Derivative of component `end` by a function's value at the left node (side 0) or the right node.
+    pub fn by_function(&self, function: usize, side: usize, end: usize) -> f64 {
+        self.row(1 + self.components + side * self.functions + function, end)
+    }
+}
+
+/// Derivative of component `end` after the step in lane `l` by component `start` before it.
+fn by_state(maps: &Maps, l: usize, start: usize, end: usize) -> f64 {
+    f64::from(u8::from(start == end)) + maps.growth[end][start][l]
 }
 
 impl Driven<'_> {
     /// Linearises all steps about the node states `states`, which need not satisfy the equation of motion.
-    pub fn step_jacobians(self, states: &Trajectory) -> Vec<StepJacobian> {
-        let functions = 0..=self.system.terms.len();
-        let mut all = Vec::with_capacity(states.nodes());
+    pub fn step_jacobians(self, states: &Trajectory) -> StepJacobians {
+        let (components, functions) = (states.components(), self.system.terms.len() + 1);
+        let size = (1 + components + 2 * functions) * components;
+        let mut values = Vec::with_capacity(size * (states.nodes() - 1));
         self.each_step(states, false, |i, maps, l| {
-            let at = |rows: &[[f64; crate::simd::LANES]; 2]| [rows[0][l], rows[1][l]];
-            let [dy, dv] = at(&maps.increment);
-            all.push(StepJacobian {
-                end: State {
-                    displacement: states.displacement[i] + dy,
-                    velocity: states.velocity[i] + dv,
-                },
-                state: by_state(maps, l),
-                left: functions.clone().map(|f| at(&maps.left[f])).collect(),
-                right: functions.clone().map(|f| at(&maps.right[f])).collect(),
-            });
+            let ends = || 0..components;
+            values.extend(ends().map(|end| states.component(end)[i] + maps.increment[end][l]));
+            for start in ends() {
+                values.extend(ends().map(|end| by_state(maps, l, start, end)));
+            }
+            for rows in [&maps.left, &maps.right] {
+                for by_function in &rows[..functions] {
+                    values.extend(ends().map(|end| by_function[end][l]));
+                }
+            }
         });
-        all
+        StepJacobians {
+            components,
+            functions,
+            values,
+        }
     }
 
-    /// Derivatives of the state at the right node of every step with respect to displacement and velocity at the left node, and with
-    /// respect to the input `quantity` at the left and at the right node, between which it is linear.
+    /// Derivatives of displacement and velocity after every step by those before it, and by the input `quantity` at both nodes, between
+    /// which it is linear.
     pub fn input_derivatives(
         self,
         states: &Trajectory,
         quantity: InputQuantity,
-    ) -> Vec<[[StateChange; 2]; 2]> {
+    ) -> Vec<[[[f64; 2]; 2]; 2]> {
         let mut all = Vec::with_capacity(states.nodes());
         self.each_step(states, true, |_, maps, l| {
             let inputs = match quantity {
                 InputQuantity::Force => &maps.forces[0],
                 InputQuantity::BaseAcceleration => &maps.bases[0],
             };
-            let by_input = [&inputs[0], &inputs[1]].map(|rows| [rows[0][l], rows[1][l]]);
-            all.push([by_state(maps, l), by_input]);
+            let pair = |of: &dyn Fn(usize) -> f64| [of(0), of(1)];
+            all.push([
+                [0, 1].map(|start| pair(&|end| by_state(maps, l, start, end))),
+                [0, 1].map(|side| pair(&|end| inputs[side][end][l])),
+            ]);
         });
         all
     }

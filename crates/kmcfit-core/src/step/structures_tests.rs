@@ -6,7 +6,7 @@ use super::response::{Linear, Prepared, in_paper_order, respond};
 use super::stage::{Drive, Function, Model, Quotient, Values};
 use super::tableau::{At, MIDPOINT, RK4, Tableau};
 use crate::simd::{self, Arithmetic, Kernel, LANES, Real};
-use crate::structure::{Element, Law};
+use crate::structure::{Law, Link};
 use num_dual::{Dual64, DualNum};
 use std::array::from_fn;
 
@@ -35,7 +35,7 @@ fn wave(seed: f64, i: usize, count: usize) -> f64 {
 
 /// A chain of `N` masses on springs and dampers, with one element of each other law and links across.
 struct Structure<const N: usize> {
-    elements: Vec<Element>,
+    elements: Vec<Link>,
     /// Masses, then coefficients, at the nodes.
     functions: Vec<Vec<f64>>,
     /// Forces and accelerations of the frames at the stages; the values jump at nodes.
@@ -46,7 +46,7 @@ struct Structure<const N: usize> {
 
 impl<const N: usize> Structure<N> {
     fn new(nodes: usize, is_driven: bool, others: usize) -> Self {
-        let element = |law, from: usize, to| Element { law, from, to };
+        let element = |law, from: usize, to| Link { law, from, to };
         let mut elements = Vec::new();
         for j in 0..N {
             elements.push(element(Law::Damping, j, j.checked_sub(1)));
@@ -396,7 +396,7 @@ fn derivatives_are_those_of_dual_numbers() {
 #[test]
 fn two_modes_converge_with_the_order_of_the_method() {
     let error = |nodes: usize, is_midpoint: bool| -> f64 {
-        let spring = |from, to| Element {
+        let spring = |from, to| Link {
             law: Law::Stiffness,
             from,
             to,

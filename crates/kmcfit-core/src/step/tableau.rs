@@ -8,6 +8,17 @@ pub(crate) enum At {
     Right,
 }
 
+impl At {
+    /// Shares of the values at the left and the right node.
+    pub fn shares(self) -> [f64; 2] {
+        match self {
+            At::Left => [1.0, 0.0],
+            At::Middle => [0.5, 0.5],
+            At::Right => [0.0, 1.0],
+        }
+    }
+}
+
 /// Coefficients of an explicit method with `S` stages: stage `s + 1` starts from `x + next[s] dt x'_s`, and the step ends at
 /// `x + sum_s end[s] dt x'_s`.
 #[derive(Debug)]

@@ -56,10 +56,7 @@ impl Case {
     }
 
     fn source(&self) -> Trajectory {
-        Trajectory {
-            displacement: self.series(0),
-            velocity: self.series(1),
-        }
+        Trajectory::of_columns(&[&self.series(0), &self.series(1)])
     }
 
     fn driven(&self) -> Driven<'_> {
@@ -84,8 +81,8 @@ impl Case {
     }
 
     fn agree_responses(&self, a: &Trajectory, b: &Trajectory) -> Result<(), TestCaseError> {
-        self.agree(&a.displacement, &b.displacement)?;
-        self.agree(&a.velocity, &b.velocity)
+        self.agree(a.displacement(0), b.displacement(0))?;
+        self.agree(a.velocity(0), b.velocity(0))
     }
 }
 
@@ -185,7 +182,11 @@ fn case_of(
 }
 
 fn methods() -> impl Strategy<Value = Method> {
-    prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)]
+    prop_oneof![
+        Just(Method::Midpoint),
+        Just(Method::Rk4),
+        Just(Method::ImplicitMidpoint)
+    ]
 }
 
 /// Any system.
@@ -251,7 +252,7 @@ fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory
         row(&|d| d.initial.velocity),
     ];
     let mut tangents = Tangents::new(slots.collect(), &[initial]);
-    let mut out = [(); LANES].map(|()| Trajectory::zeros(case.nodes()));
+    let mut out = [(); LANES].map(|()| Trajectory::zeros(1, case.nodes()));
     let last = case.nodes() - 1;
     for first in (0..last).step_by(TILE) {
         let count = TILE.min(last - first);
@@ -279,7 +280,10 @@ fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory
         tangents.advance(case.driven(), response, first..first + count);
         for (i, [y, v]) in tangents.states(0).iter().enumerate().take(count + 1) {
             for (lane, out) in out.iter_mut().enumerate() {
-                (out.displacement[first + i], out.velocity[first + i]) = (y[lane], v[lane]);
+                (
+                    out.component_mut(0)[first + i],
+                    out.component_mut(1)[first + i],
+                ) = (y[lane], v[lane]);
             }
         }
     }
@@ -291,7 +295,7 @@ proptest! {
 
     #[test]
     fn fast_responses_agree_with_those_in_the_paper_s_order(case in any_case()) {
-        let mut fast = Trajectory::zeros(case.nodes());
+        let mut fast = Trajectory::zeros(1, case.nodes());
         (case.driven().respond(EngineMode::Fastest, case.initial, &mut fast)).expect("a response");
         case.agree_responses(&fast, &case.response())?;
     }
@@ -312,16 +316,36 @@ proptest! {
     }
 
     #[test]
+    fn the_adjoint_is_the_transpose_of_the_tangent(case in any_case()) {
+        let (response, source) = (case.response(), case.source());
+        let direction = &directions(&case, false)[0];
+        let found = case.driven().nodal_adjoint(&response, &source);
+        let tangent = case.driven().tangent(&response, direction);
+        let dot = |a: &[f64], b: &[f64]| -> [f64; 2] {
+            let products = || a.iter().zip(b).map(|(a, b)| a * b);
+            [products().sum(), products().map(f64::abs).sum()]
+        };
+        let flat = |d: &SystemTangent| -> Vec<f64> {
+            let functions = d.nodal.functions().flatten().copied();
+            functions.chain([d.initial.displacement, d.initial.velocity]).collect()
+        };
+        let all = |t: &Trajectory| [t.displacement(0), t.velocity(0)].concat();
+        let [left, size] = dot(&all(&tangent), &all(&source));
+        let [right, other] = dot(&flat(&found), &flat(direction));
+        prop_assert!((left - right).abs() <= 1e-11 * size.max(other), "{left} {right}");
+    }
+
+    #[test]
     fn least_squares_in_place_agree_with_response_and_adjoint(case in linear_free_case()) {
         let (system, nodal) = (&case.system, &case.nodal);
         let (response, observed, weights) = (case.response(), case.series(2), [0.7, 0.2]);
         let last = case.nodes() - 1;
-        let mut source = Trajectory::zeros(case.nodes());
+        let mut source = Trajectory::zeros(1, case.nodes());
         let mut cost = 0.0;
-        for (i, (y, o)) in response.displacement.iter().zip(&observed).enumerate() {
+        for (i, (y, o)) in response.displacement(0).iter().zip(&observed).enumerate() {
             let w = weights[usize::from(i == 0 || i == last)];
             cost += w * (y - o) * (y - o);
-            source.displacement[i] = 2.0 * w * (y - o);
+            source.component_mut(0)[i] = 2.0 * w * (y - o);
         }
         let exact = case.driven().nodal_adjoint(&response, &source);
         let mut gradient = nodal.clone();
@@ -406,7 +430,7 @@ proptest! {
                 values.iter_mut().zip(direction).for_each(|(p, g)| *p -= a * g);
             }
             system.forward(&nodal, *initial, None).map_or(f64::INFINITY, |response| {
-                let pairs = response.displacement.iter().zip(&observed);
+                let pairs = response.displacement(0).iter().zip(&observed);
                 let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
                 trapezoid(&squares, step)
             })

@@ -1,31 +1,112 @@
-//! Responses at the nodes of the grid.
+//! States at the nodes of the grid.
 
-/// Displacement and velocity at all nodes.
+/// States at all nodes: a matrix with a row for each node and a column for each component, the displacements of the coordinates before
+/// their velocities; stored by column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory {
-    /// Displacement in m.
-    pub displacement: Vec<f64>,
-    /// Velocity in m/s.
-    pub velocity: Vec<f64>,
+    nodes: usize,
+    columns: Vec<f64>,
 }
 
 impl Trajectory {
-    /// Trajectory of zeros over `nodes` nodes.
-    pub fn zeros(nodes: usize) -> Self {
+    /// States of zero of `coordinates` coordinates at `nodes` nodes.
+    pub fn zeros(coordinates: usize, nodes: usize) -> Self {
         Self {
-            displacement: vec![0.0; nodes],
-            velocity: vec![0.0; nodes],
+            nodes,
+            columns: vec![0.0; 2 * coordinates * nodes],
+        }
+    }
+
+    /// The states with these columns: displacements (m), then velocities (m/s).
+    ///
+    /// # Panics
+    /// If the columns differ in length or their number is odd.
+    pub fn of_columns(columns: &[&[f64]]) -> Self {
+        let nodes = columns.first().map_or(0, |column| column.len());
+        assert!(
+            columns.len().is_multiple_of(2),
+            "displacements and velocities"
+        );
+        assert!(
+            columns.iter().all(|column| column.len() == nodes),
+            "columns of one length"
+        );
+        Self {
+            nodes,
+            columns: columns.concat(),
         }
     }
 
     /// Number of nodes.
     pub fn nodes(&self) -> usize {
-        self.displacement.len()
+        self.nodes
+    }
+
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.components() / 2
+    }
+
+    /// Number of columns: twice the coordinates.
+    pub fn components(&self) -> usize {
+        match self.nodes {
+            0 => 0,
+            nodes => self.columns.len() / nodes,
+        }
+    }
+
+    /// Column `c`: the displacements of coordinate `c`, or the velocities of the coordinate as many columns before as there are
+    /// coordinates.
+    #[inline(always)]
+    pub fn component(&self, c: usize) -> &[f64] {
+        &self.columns[c * self.nodes..(c + 1) * self.nodes]
+    }
+
+    /// [`Trajectory::component`], mutable.
+    #[inline(always)]
+    pub fn component_mut(&mut self, c: usize) -> &mut [f64] {
+        &mut self.columns[c * self.nodes..(c + 1) * self.nodes]
+    }
+
+    /// Displacements and velocities of `N` coordinates.
+    pub(super) fn columns_mut<const N: usize>(&mut self) -> [[&mut [f64]; N]; 2] {
+        let mut columns = self.columns.chunks_exact_mut(self.nodes);
+        std::array::from_fn(|_| std::array::from_fn(|_| columns.next().unwrap_or_default()))
+    }
+
+    /// Displacement of a coordinate, m.
+    #[inline(always)]
+    pub fn displacement(&self, coordinate: usize) -> &[f64] {
+        self.component(coordinate)
+    }
+
+    /// Velocity of a coordinate, m/s.
+    #[inline(always)]
+    pub fn velocity(&self, coordinate: usize) -> &[f64] {
+        self.component(self.coordinates() + coordinate)
+    }
+
+    /// Copies the state at a node.
+    pub(crate) fn read(&self, node: usize, state: &mut [f64]) {
+        for (c, value) in state.iter_mut().enumerate() {
+            *value = self.component(c)[node];
+        }
+    }
+
+    /// Sets the state at a node.
+    pub(crate) fn write(&mut self, node: usize, state: &[f64]) {
+        for (c, value) in state.iter().enumerate() {
+            self.component_mut(c)[node] = *value;
+        }
     }
 
     /// True if all values are finite. Once not finite, a response remains so; the last node decides.
     pub(crate) fn is_finite(&self) -> bool {
-        let last = self.nodes() - 1;
-        self.displacement[last].is_finite() && self.velocity[last].is_finite()
+        self.is_finite_at(self.nodes - 1)
+    }
+
+    /// True if the state at a node is finite.
+    pub(crate) fn is_finite_at(&self, node: usize) -> bool {
+        (0..self.components()).all(|c| self.component(c)[node].is_finite())
     }
 }

@@ -1,10 +1,20 @@
-//! Structures: masses at coordinates, and elements between them.
+//! Structures: inertias at coordinates, and elements between them.
 //!
-//! `m_j(t) (q_j'' + b_j'') + sum_e row_e p_e(t) phi_e(row_e q, row_e q') = f_j(t)` with the coordinates `q`, relative to frames that move by
-//! `b_j`. A new element is a variant of [`Law`], with its force and slopes.
+//! | file | what |
+//! |---|---|
+//! | `law` | forces of elements and their slopes: a new element is a variant of [`Law`] |
+//! | `ends` | rows `b`: how an elongation follows from coordinates and supports |
+//! | `assembly` | a structure of any size, its table of inertias and elements, its natural frequencies |
+//! | `banded` | symmetric banded matrices, for structures of any size |
+//! | `link` | elements of the small structures whose size is compiled |
 
-mod element;
+mod assembly;
+pub(crate) mod banded;
+mod ends;
 mod law;
+mod link;
 
-pub(crate) use element::Element;
+pub use assembly::{Structure, StructureError};
+pub use ends::Ends;
 pub use law::{Law, MOST_ELEMENTS};
+pub(crate) use link::Link;

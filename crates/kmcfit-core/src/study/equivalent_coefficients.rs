@@ -60,7 +60,7 @@ impl TargetResponse {
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
             let terms = problem.system.terms.iter().zip(&nodal.coefficients);
-            let (y, v) = (response.displacement[i], response.velocity[i]);
+            let (y, v) = (response.displacement(0)[i], response.velocity(0)[i]);
             let resisting: f64 = terms.map(|(term, p)| p[i] * term.phi(y, v)).sum();
             (force[i] - resisting) / nodal.mass[i]
         };
@@ -68,8 +68,8 @@ impl TargetResponse {
         let length = grid.step() * (nodes - 1) as f64;
         Self {
             grid: Grid::new(grid.start(), length, nodes).unwrap_or(grid),
-            displacement: response.displacement.clone(),
-            velocity: response.velocity.clone(),
+            displacement: response.displacement(0).to_vec(),
+            velocity: response.velocity(0).to_vec(),
             acceleration: (0..nodes).map(acceleration).collect(),
             force,
         }

@@ -65,7 +65,7 @@ pub fn equivalent_systems(
         let excitation = experiment.excitation.as_ref();
         let moved = problem.system.forward(&found, initial, excitation).ok()?;
         let largest = (response.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
-        let pairs = moved.displacement.iter().zip(&response.displacement);
+        let pairs = moved.displacement(0).iter().zip(&response.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         // A step too long for the system changes its response.
         let response_error = if off == 0.0 { 0.0 } else { off / largest };

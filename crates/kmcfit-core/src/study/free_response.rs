@@ -74,7 +74,7 @@ fn summarise(
     truth: Option<&Trajectory>,
 ) -> PredictionSummary {
     let integral = |f: &dyn Fn(usize) -> f64| {
-        let squares: Vec<f64> = (0..response.displacement.len())
+        let squares: Vec<f64> = (0..response.displacement(0).len())
             .map(|i| f(i).powi(2))
             .collect();
         trapezoid(&squares, system.grid.step())
@@ -82,10 +82,10 @@ fn summarise(
     PredictionSummary {
         displacement: state.displacement,
         velocity: state.velocity,
-        cost: truth.map(|t| integral(&|i| response.displacement[i] - t.displacement[i])),
-        energy: truth.map(|t| integral(&|i| t.displacement[i])),
-        largest: Some((response.displacement.iter()).fold(0.0, |most, y| most.max(y.abs()))),
-        last: response.displacement.last().copied(),
+        cost: truth.map(|t| integral(&|i| response.displacement(0)[i] - t.displacement(0)[i])),
+        energy: truth.map(|t| integral(&|i| t.displacement(0)[i])),
+        largest: Some((response.displacement(0).iter()).fold(0.0, |most, y| most.max(y.abs()))),
+        last: response.displacement(0).last().copied(),
         failure: None,
     }
 }

@@ -77,7 +77,7 @@ pub fn predict(
     let seen = with_run(problem, run);
     let evaluation = seen.evaluate(theta)?;
     let response = evaluation.trajectories[0].clone();
-    let y = &response.displacement;
+    let y = response.displacement(0);
     let band = covariance.map(|covariance| {
         assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
         let n = theta.len();
@@ -105,7 +105,7 @@ pub fn predict(
     for extreme in extremes {
         let other = seen.evaluate(&extreme.parameters).ok();
         let is_bounded = |e: &Evaluation| {
-            let mut all = e.trajectories[0].displacement.iter();
+            let mut all = e.trajectories[0].displacement(0).iter();
             all.all(|y| y.abs() <= most)
         };
         let Some(other) = other.filter(is_bounded) else {
@@ -113,7 +113,7 @@ pub fn predict(
             continue;
         };
         let mut distance = 0.0f64;
-        let others = &other.trajectories[0].displacement;
+        let others = other.trajectories[0].displacement(0);
         for ((ends, other), y) in envelope.iter_mut().zip(others).zip(y) {
             *ends = [ends[0].min(*other), ends[1].max(*other)];
             distance = distance.max((other - y).abs());

@@ -5,11 +5,12 @@ use super::{Law, Method, NodalCoefficients, System};
 impl Method {
     /// Largest product of step and rate, `h |lambda|`, of a stable step, with a margin of a tenth. Decay is stable up to
     /// 2.785 (`rk4`) and 2 (`midpoint`), undamped oscillation with `rk4` up to 2.828. The midpoint rule amplifies undamped
-    /// oscillations at every step, by `(h omega)^4 / 8`, which is part of its error.
-    fn stability_limit(self) -> f64 {
+    /// oscillations at every step, by `(h omega)^4 / 8`, which is part of its error. The implicit rule is stable with every step.
+    pub(crate) fn stability_limit(self) -> f64 {
         match self {
             Method::Midpoint => 1.8,
             Method::Rk4 => 2.5,
+            Method::ImplicitMidpoint => f64::INFINITY,
         }
     }
 }

@@ -52,7 +52,8 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let observed = system
         .forward(&paper_system(nodes), INITIAL, None)
         .unwrap()
-        .displacement;
+        .displacement(0)
+        .to_vec();
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,
@@ -117,7 +118,7 @@ pub fn noisy(system: &System, nodal: &NodalCoefficients, sigma: f64, seed: u64) 
     let response = system.forward(nodal, INITIAL, None).unwrap();
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
     response
-        .displacement
+        .displacement(0)
         .iter()
         .map(|y| y + sigma * noise())
         .collect()

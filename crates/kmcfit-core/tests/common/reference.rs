@@ -34,6 +34,7 @@ pub fn response<D: DualNum<Primitive = f64> + Copy>(
         let v2 = v + a1 * (dt / 2.0);
         let a2 = accelerate(0.5, i, y + v * (dt / 2.0), v2);
         let next = match method {
+            Method::ImplicitMidpoint => unreachable!("an explicit method"),
             Method::Midpoint => (y + v2 * dt, v + a2 * dt),
             Method::Rk4 => {
                 let v3 = v + a2 * (dt / 2.0);

@@ -81,6 +81,7 @@ impl<D: Real> Record<D> {
             let v2 = v + a1 * (dt / 2.0);
             let a2 = self.stage(i, 1, y + v * (dt / 2.0), v2);
             states.push(match self.method {
+                Method::ImplicitMidpoint => unreachable!("an explicit method"),
                 Method::Midpoint => (y + v2 * dt, v + a2 * dt),
                 Method::Rk4 => {
                     let v3 = v + a2 * (dt / 2.0);

@@ -26,7 +26,7 @@ fn capped(cap: f64) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    let mut problem = common::problem_of(system, list, observed.displacement, None);
+    let mut problem = common::problem_of(system, list, observed.displacement(0).to_vec(), None);
     let statement = Constraint::DampingRatio { max: cap };
     let rows = statement.build(&problem.system.grid, &problem.functions);
     problem.constrain(rows.unwrap()).unwrap();

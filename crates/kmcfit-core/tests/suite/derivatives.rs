@@ -65,15 +65,13 @@ impl Case {
         let pair = |i: usize| {
             let [a, b, c, d] = self.weights[i];
             (
-                2.0 * a * (response.displacement[i] - b),
-                2.0 * c * (response.velocity[i] - d),
+                2.0 * a * (response.displacement(0)[i] - b),
+                2.0 * c * (response.velocity(0)[i] - d),
             )
         };
-        let (displacement, velocity) = (0..self.weights.len()).map(pair).unzip();
-        Trajectory {
-            displacement,
-            velocity,
-        }
+        let (displacement, velocity): (Vec<f64>, Vec<f64>) =
+            (0..self.weights.len()).map(pair).unzip();
+        Trajectory::of_columns(&[&displacement, &velocity])
     }
 
     fn adjoint_gradient(&self) -> SystemTangent {
@@ -170,10 +168,8 @@ proptest! {
             },
             initial: other.initial,
         };
-        let weights = Trajectory {
-            displacement: cut(&other.force),
-            velocity: cut(&other.nodal.coefficients[1]),
-        };
+        let weights =
+            Trajectory::of_columns(&[&cut(&other.force), &cut(&other.nodal.coefficients[1])]);
         let driven = Driven {
             system: &system,
             nodal: &case.nodal,
@@ -181,7 +177,7 @@ proptest! {
         };
         let forward = driven.tangent(&response, &direction);
         let backward = discrete_adjoint(&system, &case.nodal, force, &response, &weights);
-        let all = |t: &Trajectory| [t.displacement.clone(), t.velocity.clone()].concat();
+        let all = |t: &Trajectory| [t.displacement(0), t.velocity(0)].concat();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (ju, w) = (all(&forward), all(&weights));
         let left = dot(&ju, &w);
@@ -206,8 +202,8 @@ proptest! {
         let other = response(case.method, &inputs, start, system.grid.step());
         let largest = other.iter().fold(0.0f64, |m, s| m.max(s.0.abs()).max(s.1.abs()));
         for (i, (y, v)) in other.iter().enumerate() {
-            prop_assert!((ours.displacement[i] - y).abs() <= 1e-13 * largest);
-            prop_assert!((ours.velocity[i] - v).abs() <= 1e-13 * largest);
+            prop_assert!((ours.displacement(0)[i] - y).abs() <= 1e-13 * largest);
+            prop_assert!((ours.velocity(0)[i] - v).abs() <= 1e-13 * largest);
         }
     }
 }
@@ -349,13 +345,9 @@ fn initial_gradients(nodes: usize, is_nonlinear: bool) -> [State; 2] {
     let response = system.forward(&nodal, common::INITIAL, None).unwrap();
     let observed = of(|t| (0.7 * t).cos());
     let weights = trapezoid_weights(nodes, system.grid.step());
-    let pairs = response.displacement.iter().zip(&observed);
-    let source = Trajectory {
-        displacement: (pairs.zip(weights))
-            .map(|((y, o), w)| 2.0 * w * (y - o))
-            .collect(),
-        velocity: vec![0.0; nodes],
-    };
+    let pairs = response.displacement(0).iter().zip(&observed);
+    let slopes = (pairs.zip(weights)).map(|((y, o), w)| 2.0 * w * (y - o));
+    let source = Trajectory::of_columns(&[&slopes.collect::<Vec<f64>>(), &vec![0.0; nodes]]);
     [
         continuous_adjoint(&system, &nodal, None, &response, &observed).initial,
         discrete_adjoint(&system, &nodal, None, &response, &source).initial,

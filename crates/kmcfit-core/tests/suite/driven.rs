@@ -3,7 +3,7 @@
 
 use crate::common::closed_form::constant_coefficients;
 use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::step::{Trajectory, observe};
+use kmcfit_core::internals::step::observe;
 use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
@@ -106,7 +106,7 @@ fn a_harmonic_force_gives_the_steady_state_of_the_textbook() {
                 let settled = nodes * 5 / 6;
                 let (amplitude, phase) = tone(
                     &grid.times()[settled..],
-                    &response.displacement[settled..],
+                    &response.displacement(0)[settled..],
                     w,
                 );
                 (amplitude * impedance / 5.0 - 1.0).hypot(phase - lag)
@@ -193,7 +193,11 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
                 .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                 .unwrap();
             let after = |t: f64| if t > 0.0 { step_response(t) } else { 0.0 };
-            let times = system.grid.times().into_iter().zip(&response.displacement);
+            let times = system
+                .grid
+                .times()
+                .into_iter()
+                .zip(response.displacement(0));
             times.fold(0.0f64, |most, (t, y)| {
                 most.max((y - after(t - 1.0) + after(t - 4.0)).abs())
             })
@@ -232,7 +236,11 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
             let response = system
                 .forward(&constants(nodes, &[M, 0.0, K]), REST, Some(&pushed(force)))
                 .unwrap();
-            let times = system.grid.times().into_iter().zip(&response.displacement);
+            let times = system
+                .grid
+                .times()
+                .into_iter()
+                .zip(response.displacement(0));
             times.fold(0.0f64, |most, (t, y)| most.max((y - exact(t)).abs()))
         };
         check_order(method, "half sine", error);
@@ -252,10 +260,7 @@ fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     let response = system
         .forward(&constants(nodes, &[1.0, 1.0, friction]), initial, None)
         .unwrap();
-    let Trajectory {
-        displacement: y,
-        velocity: v,
-    } = response;
+    let (y, v) = (response.displacement(0), response.velocity(0));
     let turns = (1..nodes - 1).filter(|i| v[*i] * v[i + 1] <= 0.0);
     // At the turn itself: v is a line between the nodes, and y a parabola.
     let h = system.grid.step();

@@ -34,7 +34,7 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
         damping,
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let mut problem = common::problem_of(system, list, response.displacement, None);
+    let mut problem = common::problem_of(system, list, response.displacement(0).to_vec(), None);
     if silent_force {
         problem = problem
             .with(|parts| {

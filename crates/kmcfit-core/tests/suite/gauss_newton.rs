@@ -44,7 +44,7 @@ fn problem(units: Units) -> Problem {
     };
     let response = system.forward(&nodal, common::INITIAL, None).unwrap();
     let times = system.grid.times();
-    let drifted = response.displacement.iter().zip(&times);
+    let drifted = response.displacement(0).iter().zip(&times);
     let drifted: Vec<f64> = drifted.map(|(y, t)| y + 1.0 + 0.05 * t).collect();
     let observed = with_noise(&drifted, 1.0, 7)
         .iter()

@@ -65,7 +65,8 @@ fn with_records(
             .forward(nodal, *initial, excitation.as_ref())
             .unwrap();
         let weighting = Weighting::Sigma(1e-3);
-        let channel = Channel::displacement_at_nodes(response.displacement, 1, weighting, &grid);
+        let channel =
+            Channel::displacement_at_nodes(response.displacement(0).to_vec(), 1, weighting, &grid);
         let mut record = Experiment::free("record", *initial, nodes).with_channel(channel);
         record.excitation = excitation;
         record
@@ -236,8 +237,8 @@ fn a_constant_factor_leaves_response_and_cost_and_is_named() {
         problem.evaluate(&scaled).unwrap(),
     );
     let off = largest(
-        &a.trajectories[0].displacement,
-        &b.trajectories[0].displacement,
+        a.trajectories[0].displacement(0),
+        b.trajectories[0].displacement(0),
     );
     let cost = (a.cost - b.cost).abs() / a.cost;
     println!("motion {off:.1e} m, cost {cost:.1e} of itself");
@@ -312,7 +313,7 @@ fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
     for seed in 0..200 {
         let mut noisy = problem.clone();
         let grid = &problem.system.grid;
-        let values = with_noise(&clean.displacement, sigma, seed);
+        let values = with_noise(clean.displacement(0), sigma, seed);
         noisy = noisy
             .with(|parts| {
                 parts.experiments[0].channels = vec![Channel::displacement_at_nodes(

@@ -31,7 +31,7 @@ fn problem(basis: &Basis) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    common::problem_of(system, list, response.displacement, None)
+    common::problem_of(system, list, response.displacement(0).to_vec(), None)
 }
 
 fn knots() -> Basis {

@@ -4,7 +4,6 @@ use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::Fit;
-use kmcfit_core::internals::step::Trajectory;
 use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
@@ -113,12 +112,12 @@ fn responses_of_a_linear_system_superpose() {
         let both = system.forward(&nodal, case.state(), Some(&excitation));
         let free = system.forward(&nodal, case.state(), None).unwrap();
         let forced = system.forward(&nodal, rest, Some(&excitation)).unwrap();
-        let sum: Vec<f64> = (free.displacement.iter().zip(&forced.displacement))
+        let sum: Vec<f64> = (free.displacement(0).iter().zip(forced.displacement(0)))
             .map(|(a, b)| a + b)
             .collect();
-        let scale = size(&free.displacement) + size(&forced.displacement);
+        let scale = size(free.displacement(0)) + size(forced.displacement(0));
         assert!(
-            distance(&both.unwrap().displacement, &sum) <= ROUNDING * scale,
+            distance(both.unwrap().displacement(0), &sum) <= ROUNDING * scale,
             "{case:?}"
         );
     });
@@ -133,10 +132,8 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
             let grid = system.grid;
             let excitation = case.excitation(&grid);
             let response = system.forward(&case.nodal(&grid), case.state(), Some(&excitation));
-            let Trajectory {
-                displacement: y,
-                velocity: v,
-            } = response.unwrap();
+            let response = response.unwrap();
+            let (y, v) = (response.displacement(0), response.velocity(0));
             let energy = |i: usize| {
                 let t = grid.time(i);
                 0.5 * (case.value(0, t) * v[i] * v[i] + case.value(2, t) * y[i] * y[i])
@@ -172,7 +169,12 @@ fn record(case: Case, per_metre: f64, later: f64) -> Record {
         .unwrap();
     // A deterministic error makes every fit inexact.
     let read = |(i, y): (usize, &f64)| per_metre * (y + 0.01 * (1.3 * i as f64).sin());
-    let samples: Vec<f64> = response.displacement.iter().enumerate().map(read).collect();
+    let samples: Vec<f64> = response
+        .displacement(0)
+        .iter()
+        .enumerate()
+        .map(read)
+        .collect();
     let times: Vec<f64> = grid.times().iter().map(|t| t + later).collect();
     Record::new(format!("from {:?}", case.start))
         .from_state(per_metre * case.start[0], per_metre * case.start[1])

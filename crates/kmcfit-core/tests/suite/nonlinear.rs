@@ -133,7 +133,7 @@ fn a_forced_duffing_oscillator_to_one_per_cent() {
     for factors in [[2.5, 5.0, 2.0, 3.0], [0.4, 0.2, 0.5, 0.0]] {
         let case = duffing(factors);
         // Strongly nonlinear: at the largest displacement the cubic force exceeds the linear one.
-        let most = (case.response().displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
+        let most = (case.response().displacement(0).iter()).fold(0.0f64, |m, y| m.max(y.abs()));
         assert!(1.2 * most * most > 2.5, "{most}");
         case.check();
     }
@@ -172,12 +172,12 @@ fn a_mass_that_sticks_in_every_cycle_to_one_per_cent() {
         let nodes = cycle * STEPS..(cycle + 1) * STEPS;
         // At rest except for the creep of the smoothed friction, which alone balances the force.
         let sticks = |i: &usize| {
-            let pull = force[*i] - 2.0 * response.displacement[*i];
-            response.velocity[*i].abs() < 2.0 * WIDTH && pull.abs() < FRICTION
+            let pull = force[*i] - 2.0 * response.displacement(0)[*i];
+            response.velocity(0)[*i].abs() < 2.0 * WIDTH && pull.abs() < FRICTION
         };
         let share = nodes.clone().filter(sticks).count() as f64 / STEPS as f64;
         let fastest = nodes
-            .map(|i| response.velocity[i].abs())
+            .map(|i| response.velocity(0)[i].abs())
             .fold(0.0, f64::max);
         println!("cycle {cycle}: sticks for {share:.2} of it, up to {fastest:.2} m/s");
         assert!((0.1..0.7).contains(&share), "{share}");

@@ -24,7 +24,7 @@ fn problem(sigma: f64) -> Problem {
         coefficients: values[1..].to_vec(),
     };
     let response = system.forward(&nodal, common::INITIAL, None).unwrap();
-    let observed = with_noise(&response.displacement, 1.0, 7);
+    let observed = with_noise(response.displacement(0), 1.0, 7);
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,

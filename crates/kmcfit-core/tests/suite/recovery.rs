@@ -58,7 +58,7 @@ fn paper_data(nodes: usize) -> (System, NodalCoefficients, Vec<f64>) {
     let system = common::system(nodes, Method::Midpoint);
     let truth = common::paper_system(nodes);
     let response = system.forward(&truth, common::INITIAL, None).unwrap();
-    (system, truth, response.displacement)
+    (system, truth, response.displacement(0).to_vec())
 }
 
 #[test]
@@ -197,7 +197,8 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
                 nodal: &here.nodal,
                 excitation: None,
             };
-            driven.tangent(response, &direction).displacement
+            let tangent = driven.tangent(response, &direction);
+            tangent.displacement(0).to_vec()
         })
         .collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

@@ -32,7 +32,12 @@ fn problem() -> Problem {
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
     let response = system.forward(&truth, common::INITIAL, None).unwrap();
-    let observed: Vec<f64> = response.displacement.into_iter().step_by(STRIDE).collect();
+    let observed: Vec<f64> = response
+        .displacement(0)
+        .iter()
+        .copied()
+        .step_by(STRIDE)
+        .collect();
     let step = system.grid.step();
     // The noise is given as zero; a rule that estimates it would treat so few samples as noise.
     let weighting = Weighting::Sigma(1e-8);
@@ -146,7 +151,12 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         velocity: 0.0,
     };
     let response = system.forward(&nodal, rest, Some(&excitation)).unwrap();
-    let observed = response.displacement.into_iter().step_by(4).collect();
+    let observed = response
+        .displacement(0)
+        .iter()
+        .copied()
+        .step_by(4)
+        .collect();
     let weighting = Weighting::Sigma(1e-4);
     let channel = Channel::displacement_at_nodes(observed, 4, weighting, &system.grid);
     let experiment = Experiment::free("two sines", rest, nodes)

@@ -137,6 +137,7 @@ fn lively(values: &[f64]) -> &[f64] {
 fn error_constant(method: Method) -> (f64, f64) {
     match method {
         Method::Midpoint => (2.0, 6.0),
+        Method::ImplicitMidpoint => (2.0, 12.0),
         Method::Rk4 => (4.0, 120.0),
     }
 }

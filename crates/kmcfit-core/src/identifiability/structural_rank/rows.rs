@@ -172,6 +172,11 @@ impl Inputs {
             }
             (ChannelKind::Displacement, Some(node), Method::Rk4) => stage(node.checked_sub(1), 1),
             (ChannelKind::Velocity, Some(node), Method::Midpoint) => stage(node.checked_sub(1), 1),
+            (
+                ChannelKind::Displacement | ChannelKind::Velocity,
+                Some(node),
+                Method::ImplicitMidpoint,
+            ) => stage(node.checked_sub(1), 1),
             (ChannelKind::Velocity, Some(node), Method::Rk4) => stage(node.checked_sub(1), 2),
             _ => stage(Some(last), 2),
         }

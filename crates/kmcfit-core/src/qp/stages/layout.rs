@@ -18,15 +18,22 @@ pub struct StageLayout {
     pub constants: Vec<usize>,
 }
 
-/// The variables of one linearised response: displacement and velocity at every node after the first, node by node.
+/// The variables of one linearised response: the components of its state at every node after the first, node by node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseVariables {
-    /// Displacement at node 1; the velocity at node 1 follows, then the pair at node 2.
+    /// First component at node 1; the others follow, then those at node 2.
     pub first: usize,
     /// Number of nodes, the first included.
     pub nodes: usize,
-    /// Displacement and velocity at node 0, where they are variables.
-    pub initial: [Option<usize>; 2],
+    /// Each component at node 0, where it is a variable.
+    pub initial: Vec<Option<usize>>,
+}
+
+impl ResponseVariables {
+    /// Number of components of the state.
+    pub fn components(&self) -> usize {
+        self.initial.len()
+    }
 }
 
 /// Role and node of a variable.
@@ -34,7 +41,7 @@ pub struct ResponseVariables {
 pub(super) enum Place {
     /// History `f` at a node.
     History(usize, usize),
-    /// Component `2 r + q` of the responses at a node.
+    /// Component of the responses, one response after the other, at a node.
     Response(usize, usize),
     /// Constant `c`.
     Constant(usize),
@@ -51,6 +58,14 @@ impl Place {
 }
 
 impl StageLayout {
+    /// Number of components of all responses.
+    pub(super) fn components(&self) -> usize {
+        self.responses
+            .iter()
+            .map(ResponseVariables::components)
+            .sum()
+    }
+
     /// The parameters of `functions`; `None` if a function is neither nodal nor constant.
     pub fn of(functions: &Parameterization) -> Option<Self> {
         let mut layout = Self {
@@ -83,21 +98,22 @@ impl StageLayout {
                 put(variable, Place::History(f, node))?;
             }
         }
-        for (r, response) in self.responses.iter().enumerate() {
+        let mut base = 0;
+        for response in &self.responses {
             if response.nodes == 0 || response.nodes > self.nodes {
                 return None;
             }
-            for q in 0..2 {
-                if let Some(variable) = response.initial[q] {
-                    put(variable, Place::Response(2 * r + q, 0))?;
+            let components = response.components();
+            for (q, initial) in response.initial.iter().enumerate() {
+                if let Some(variable) = initial {
+                    put(*variable, Place::Response(base + q, 0))?;
                 }
                 for node in 1..response.nodes {
-                    put(
-                        response.first + 2 * (node - 1) + q,
-                        Place::Response(2 * r + q, node),
-                    )?;
+                    let variable = response.first + components * (node - 1) + q;
+                    put(variable, Place::Response(base + q, node))?;
                 }
             }
+            base += components;
         }
         for (c, variable) in self.constants.iter().enumerate() {
             put(*variable, Place::Constant(c))?;

@@ -50,9 +50,7 @@ impl Sizes {
             return None;
         }
         Some(Self {
-            states: 2 * layout.responses.len()
-                + orders.iter().sum::<usize>()
-                + layout.constants.len(),
+            states: layout.components() + orders.iter().sum::<usize>() + layout.constants.len(),
             controls: orders.len(),
             orders,
             places,
@@ -68,17 +66,19 @@ fn nonzero(rows: &Rows, i: usize) -> impl Iterator<Item = usize> + '_ {
 
 /// The first node at which a variable of row `i` acts: constants act at all, and come into play only where there is nothing else.
 pub(super) fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
-    let nodes = nonzero(rows, i).filter_map(|j| match places[j] {
-        Place::Constant(_) => None,
-        place => Some(place.node()),
-    });
-    nodes.min().unwrap_or(0)
+    first_node(nonzero(rows, i), places)
 }
 
 /// The first node at which a variable of a cone acts.
 pub(super) fn stage_of_cone(cone: &Cone, places: &[Place]) -> usize {
     let rows = 0..cone.rows.len();
-    let occupied = rows.filter(|i| nonzero(&cone.rows, *i).next().is_some());
-    let stages = occupied.map(|i| stage_of(&cone.rows, i, places));
-    stages.min().unwrap_or(0)
+    first_node(rows.flat_map(|i| nonzero(&cone.rows, i)), places)
+}
+
+fn first_node(variables: impl Iterator<Item = usize>, places: &[Place]) -> usize {
+    let nodes = variables.filter_map(|j| match places[j] {
+        Place::Constant(_) => None,
+        place => Some(place.node()),
+    });
+    nodes.min().unwrap_or(0)
 }

@@ -45,7 +45,7 @@ fn program(random: &mut ChaCha8Rng) -> Subproblem {
         layout.responses.push(ResponseVariables {
             first: parameters + 2 * r * (nodes - 1),
             nodes,
-            initial: [None, None],
+            initial: vec![None, None],
         });
         for node in 1..nodes {
             for q in 0..2 {
@@ -97,7 +97,9 @@ fn program(random: &mut ChaCha8Rng) -> Subproblem {
         for i in 0..nodes {
             let mut rows = Rows::new();
             rows.push([(i, 1.0), (last * nodes + i, 1.0)], -size);
-            rows.push([((histories / 2) * nodes + i, 5.0)], 0.1 * size);
+            // A constant alone in a row is at no node.
+            let middle = if last == 1 { constant } else { nodes + i };
+            rows.push([(middle, 5.0)], 0.1 * size);
             if last == 2 {
                 rows.push([(i, 1.0), (last * nodes + i, -1.0)], 0.0);
             }

@@ -61,7 +61,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
     /// `None` where the subproblem is of another form: an equality that is neither a step of a response nor fixes a first
     /// state, bounds without a point between them, or a row that speaks of more than one step of a response.
     pub fn new(sub: &Subproblem, layout: &StageLayout, sizes: Sizes) -> Option<Self> {
-        let responses = 2 * layout.responses.len();
+        let responses = layout.components();
         let mut values = Vec::new();
         let mut next = Vec::new();
         for (f, order) in sizes.orders.iter().enumerate() {
@@ -74,11 +74,13 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         let stages = layout.nodes;
         let mut fixed = [None; X];
         fixed[constants + layout.constants.len()..].fill(Some(0.0));
-        for (r, response) in layout.responses.iter().enumerate() {
-            for q in 0..2 {
-                if response.initial[q].is_none() {
-                    fixed[2 * r + q] = Some(0.0);
-                }
+        let initial = layout
+            .responses
+            .iter()
+            .flat_map(|response| &response.initial);
+        for (component, initial) in initial.enumerate() {
+            if initial.is_none() {
+                fixed[component] = Some(0.0);
             }
         }
         let mut program = Self {
@@ -110,12 +112,14 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         for i in 0..sub.equalities.len() {
             program.add_equality(&sub.equalities, i)?;
         }
-        for (r, response) in layout.responses.iter().enumerate() {
+        let mut base = 0;
+        for response in &layout.responses {
             for step in 0..response.nodes - 1 {
-                let steps = step * responses + 2 * r;
-                let known = &program.equalities[steps..steps + 2];
+                let steps = step * responses + base;
+                let known = &program.equalities[steps..steps + response.components()];
                 (!known.contains(&NONE)).then_some(())?;
             }
+            base += response.components();
         }
         program.add_residuals(sub)?;
         program.add_constraints(sub)?;

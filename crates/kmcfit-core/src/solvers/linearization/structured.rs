@@ -9,13 +9,13 @@ use crate::qp::{ResponseVariables, StageLayout, Subproblem};
 use crate::record::{Channel, ChannelKind, Experiment, Majorant, Weighting};
 use crate::rows::merge_columns;
 use crate::signal::SecondOrder;
-use crate::step::{StepJacobian, Trajectory};
+use crate::step::{StepJacobians, Trajectory};
 
-/// Capacity for a linearised step: three states, three functions at both ends.
-const ENTRIES: usize = 9;
+/// Capacity for a linearised step besides the state before it: a component of the next state, three functions at both ends.
+const OTHER_ENTRIES: usize = 7;
 
 /// Linearised steps of all experiments.
-pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
+pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<StepJacobians> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
         view.driven().step_jacobians(view.response)
@@ -32,17 +32,22 @@ pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian
 pub fn subproblem(
     problem: &Problem,
     evaluation: &Evaluation,
-    steps: &[Vec<StepJacobian>],
+    steps: &[StepJacobians],
 ) -> Subproblem {
     let parameters = problem.parameters();
-    let states: usize = problem.experiments.iter().map(|e| 2 * (e.nodes - 1)).sum();
+    let components: Vec<usize> = (evaluation.trajectories.iter())
+        .map(Trajectory::components)
+        .collect();
+    let records = || problem.experiments.iter().zip(&components);
+    let states: usize = records().map(|(e, count)| count * (e.nodes - 1)).sum();
     let mut sub = Subproblem::new(parameters + states);
     sub.elimination_order = problem.functions.first_nodes();
-    for experiment in &problem.experiments {
+    for (experiment, count) in records() {
         let nodes = 1..experiment.nodes as u32;
-        sub.elimination_order.extend(nodes.flat_map(|i| [i, i]));
+        let places = nodes.flat_map(|i| std::iter::repeat_n(i, *count));
+        sub.elimination_order.extend(places);
     }
-    sub.layout = layout(problem);
+    sub.layout = layout(problem, &components);
     let mut base = parameters;
     for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
@@ -51,26 +56,28 @@ pub fn subproblem(
             problem,
             experiment,
             base,
+            components: components[e],
         };
         columns.add_steps(steps, view.response, &mut sub.equalities);
         for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
             columns.add_samples(channel, predicted, view, &mut sub);
         }
-        base += 2 * (experiment.nodes - 1);
+        base += components[e] * (experiment.nodes - 1);
     }
     sub
 }
 
 /// Assignment of the unknowns to nodes; `None` if a function is neither nodal nor constant, or experiments share an initial state.
-fn layout(problem: &Problem) -> Option<StageLayout> {
+fn layout(problem: &Problem, components: &[usize]) -> Option<StageLayout> {
     let functions = &problem.functions;
     let mut layout = StageLayout::of(functions)?;
     let first_scalar = functions.scalar_range().start;
     let mut first = problem.parameters();
-    for experiment in &problem.experiments {
-        let initial = experiment.initial_parameters;
+    for (experiment, components) in problem.experiments.iter().zip(components) {
+        let initial = experiment.initial_parameters.iter();
         let initial = initial.map(|index| index.map(|index| first_scalar + index));
-        for variable in initial.into_iter().flatten() {
+        let initial: Vec<Option<usize>> = initial.collect();
+        for variable in initial.iter().copied().flatten() {
             let constants = &mut layout.constants;
             constants.remove(constants.iter().position(|j| *j == variable)?);
         }
@@ -79,7 +86,7 @@ fn layout(problem: &Problem) -> Option<StageLayout> {
             nodes: experiment.nodes,
             initial,
         });
-        first += 2 * (experiment.nodes - 1);
+        first += components * (experiment.nodes - 1);
     }
     Some(layout)
 }
@@ -89,14 +96,15 @@ struct UnknownColumns<'a> {
     problem: &'a Problem,
     experiment: &'a Experiment,
     base: usize,
+    components: usize,
 }
 
 impl UnknownColumns<'_> {
-    /// Column of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a fixed initial state.
+    /// Column of component `q` of the state at node `i`; `None` for a fixed initial state.
     fn state(&self, i: usize, q: usize) -> Option<usize> {
         match i {
             0 => Some(self.scalar(self.experiment.initial_parameters[q]?)),
-            _ => Some(self.base + 2 * (i - 1) + q),
+            _ => Some(self.base + self.components * (i - 1) + q),
         }
     }
 
@@ -104,24 +112,21 @@ impl UnknownColumns<'_> {
         self.problem.functions.scalar_range().start + index
     }
 
-    fn add_steps(&self, steps: &[StepJacobian], states: &Trajectory, equalities: &mut Rows) {
+    fn add_steps(&self, steps: &StepJacobians, states: &Trajectory, equalities: &mut Rows) {
         let mut entries = Vec::new();
-        equalities.reserve(2 * steps.len(), 2 * steps.len() * ENTRIES);
+        let rows = self.components * steps.iter().len();
+        equalities.reserve(rows, rows * (self.components + OTHER_ENTRIES));
         for (i, step) in steps.iter().enumerate() {
-            let ends = [step.end.displacement, step.end.velocity];
-            let next = [states.displacement[i + 1], states.velocity[i + 1]];
-            for q in 0..2 {
+            for q in 0..self.components {
                 entries.clear();
                 entries.extend(self.state(i + 1, q).map(|j| (j, 1.0)));
-                for s in 0..2 {
-                    entries.extend(self.state(i, s).map(|j| (j, -step.state[s][q])));
+                for s in 0..self.components {
+                    entries.extend(self.state(i, s).map(|j| (j, -step.by_state(s, q))));
                 }
-                self.add_function_slopes(
-                    i,
-                    &|f, side| -[&step.left, &step.right][side][f][q],
-                    &mut entries,
-                );
-                equalities.push(entries.iter().copied(), ends[q] - next[q]);
+                let slope = |f: usize, side: usize| -step.by_function(f, side, q);
+                self.add_function_slopes(i, &slope, &mut entries);
+                let missing = step.end(q) - states.component(q)[i + 1];
+                equalities.push(entries.iter().copied(), missing);
             }
         }
     }

@@ -169,7 +169,7 @@ impl Search<'_> {
         let mut units = sizes.to_vec();
         if sub.variables > sizes.len() {
             for response in &evaluation.trajectories {
-                let pair = [&response.displacement, &response.velocity].map(|x| positive_rms(x));
+                let pair = [response.displacement(0), response.velocity(0)].map(positive_rms);
                 units.extend((1..response.nodes()).flat_map(|_| pair));
             }
         }

@@ -59,13 +59,13 @@ fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> f64 {
     }
     let pairs = a.trajectories.iter().zip(&b.trajectories);
     let changes = pairs.flat_map(|(a, b)| {
-        let nodes = a.displacement.iter().zip(&b.displacement);
+        let nodes = a.displacement(0).iter().zip(b.displacement(0));
         nodes.map(|(a, b)| a - b)
     });
     let own = a
         .trajectories
         .iter()
-        .flat_map(|t| t.displacement.iter().copied());
+        .flat_map(|t| t.displacement(0).iter().copied());
     ratios.max(relative(rms(changes), rms(own)))
 }
 

@@ -45,7 +45,7 @@ fn response_from(initial: State, nodes: usize) -> TargetResponse {
     let forces = excitation.force.as_ref().unwrap().at_nodes();
     let moved = fine.forward(&nodal, initial, Some(&excitation)).unwrap();
     let pick = |f: &[f64]| -> Vec<f64> { f.iter().step_by(32).copied().collect() };
-    let (y, v) = (&moved.displacement, &moved.velocity);
+    let (y, v) = (moved.displacement(0), moved.velocity(0));
     let acceleration: Vec<f64> = (0..y.len())
         .map(|i| {
             let [c, k] = [0, 1].map(|j| nodal.coefficients[j][i]);
@@ -95,7 +95,7 @@ fn response_error(nodal: &NodalCoefficients, response: &TargetResponse, initial:
     let excitation = Excitation::force_at_nodes(&response.force);
     let system = system(response.grid.nodes(), Method::Midpoint);
     let moved = system.forward(nodal, initial, Some(&excitation)).unwrap();
-    let pairs = moved.displacement.iter().zip(&response.displacement);
+    let pairs = moved.displacement(0).iter().zip(&response.displacement);
     pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()))
 }
 

@@ -168,7 +168,10 @@ fn extremes_of_the_paper_s_data_contain_the_truth_and_the_paper_s_optimum() {
                 let fresh = problem.evaluate(&end.parameters).unwrap();
                 assert!(fresh.misfit <= 0.0114 && fresh.misfit == end.misfit);
                 assert!(problem.constraints.hold(&end.parameters, 1e-9));
-                assert_eq!(fresh.trajectories[0].displacement[0], INITIAL.displacement);
+                assert_eq!(
+                    fresh.trajectories[0].displacement(0)[0],
+                    INITIAL.displacement
+                );
             }
             let node = (time / problem.system.grid.step()) as usize;
             let exact = truth[f * NODES + node];

@@ -67,11 +67,11 @@ fn the_band_of_a_prediction_agrees_with_refits() {
                 .best
                 .parameters;
             let found = predict(&problem, &theta, &run, None, &[]).unwrap();
-            found.response.displacement
+            found.response.displacement(0).to_vec()
         })
         .collect();
     for i in (10..101).step_by(10) {
-        let y = found.response.displacement[i];
+        let y = found.response.displacement(0)[i];
         let count = responses.len() as f64;
         let mean = responses.iter().map(|m| m[i]).sum::<f64>() / count;
         let spread = (responses.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / count).sqrt();
@@ -143,7 +143,7 @@ fn systems_of_equal_fit_differ_in_prediction() {
         );
         let found = predict(&problem, &truth, &run, None, &extremes).unwrap();
         let worst = found.worst.unwrap();
-        let response = &found.response.displacement;
+        let response = found.response.displacement(0);
         let inside = worst
             .iter()
             .zip(response)

@@ -62,7 +62,7 @@ pub fn samples(
 ) -> Vec<f64> {
     let response = system.forward(truth, REST, excitation).unwrap();
     let every: Vec<f64> = response
-        .displacement
+        .displacement(0)
         .iter()
         .step_by(stride)
         .copied()

@@ -63,7 +63,7 @@ impl Measured {
 
     /// Response on `nodes` nodes: cubic between times, extended harmonically with the dominant frequency beyond them.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
-        let mut response = Trajectory::zeros(nodes);
+        let mut response = Trajectory::zeros(1, nodes);
         let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
         let last = self.places.len() - 1;
         let mut i = 0;
@@ -80,8 +80,8 @@ impl Measured {
                 }
                 false => self.swung_on(i, since),
             };
-            response.displacement[node] = y;
-            response.velocity[node] = v;
+            response.component_mut(0)[node] = y;
+            response.component_mut(1)[node] = v;
         }
         response
     }
@@ -186,7 +186,7 @@ mod tests {
     ) -> f64 {
         let one = |i: usize| {
             let [y, v, _] = state(i as f64 * STEP);
-            let [of_y, of_v] = [response.displacement[i] - y, response.velocity[i] - v];
+            let [of_y, of_v] = [response.displacement(0)[i] - y, response.velocity(0)[i] - v];
             of_y.abs() + of_v.abs()
         };
         // NaN counts as the largest.

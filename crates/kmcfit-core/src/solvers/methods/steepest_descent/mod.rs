@@ -1,13 +1,13 @@
 //! Steepest descent with the paper's trial steps.
 
-mod batched_trials;
-
 use super::{Step, StepRule};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::record::Weighting;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
+use crate::step::{EngineMode, SearchRay, is_linear_midpoint};
 
 /// Number of trial steps.
 const TRIALS: u32 = 50;
@@ -17,7 +17,8 @@ const LONGEST: f64 = 5.0;
 /// Tries the steps `5 sqrt(G^2) / i^4`, `i = 1..50`, along the negative L2 gradient and takes the trial of lowest cost, if it
 /// is strictly lower than the current one.
 ///
-/// For the paper's problem all trials are computed in batches, with bit-identical results.
+/// For the paper's problem eight trials at a time choose the candidates for the lowest cost, and these alone are computed in the paper's
+/// order of operations: the results are the same bits.
 #[derive(Default)]
 pub struct SteepestDescent {
     spare: Vec<Evaluation>,
@@ -33,10 +34,15 @@ struct Best {
 impl StepRule for SteepestDescent {
     fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step {
         let lengths = lengths(point);
-        let best = match batched_trials::ray(work.problem(), point) {
-            Some(ray) => batched_trials::lowest(work, point, ray, &lengths, &mut self.spare),
-            None => self.one_by_one(work, point, &lengths),
-        };
+        let (problem, mode) = (work.problem(), work.mode);
+        let best = work.forwards(lengths.len() as u64, || match ray(problem, point) {
+            Some(ray) => {
+                let candidates = ray.candidates(&lengths).into_iter();
+                let candidates: Vec<f64> = candidates.map(|which| lengths[which]).collect();
+                self.lowest(problem, EngineMode::Reference, point, &candidates)
+            }
+            None => self.lowest(problem, mode, point, &lengths),
+        });
         match best {
             Some(best) => Step::Moved {
                 point: Box::new(work.complete(best.parameters, best.evaluation)),
@@ -53,17 +59,20 @@ impl StepRule for SteepestDescent {
 }
 
 impl SteepestDescent {
-    fn one_by_one(
+    /// Best trial, if it lowers the cost.
+    fn lowest(
         &mut self,
-        work: &mut CountedEvaluator,
+        problem: &Problem,
+        mode: EngineMode,
         point: &Iterate,
         lengths: &[f64],
     ) -> Option<Best> {
         let mut best = None;
         for &length in lengths {
             let parameters = trial(point, length);
-            let mut evaluation = take(&mut self.spare, work.problem());
-            if work.evaluate_into(&parameters, &mut evaluation).is_err() {
+            let mut evaluation = take(&mut self.spare, problem);
+            let found = problem.evaluate_for(mode, &parameters, &mut evaluation);
+            if found.is_err() {
                 self.spare.push(evaluation);
                 continue;
             }
@@ -110,3 +119,32 @@ fn trial(point: &Iterate, length: f64) -> Vec<f64> {
     let moves = point.parameters.iter().zip(&point.gradient.l2);
     moves.map(|(p, g)| p - length * g).collect()
 }
+
+/// Trial systems as a search ray, for the paper's problem: one free record with a sample at every node, nodal functions,
+/// linear terms, the midpoint rule and the integral cost alone; `None` for any other problem.
+fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
+    let (experiment, channel, _) = problem.one_full_record()?;
+    let system = &problem.system;
+    let nodes = experiment.nodes;
+    let is_integral = matches!(channel.weighting(), Weighting::Integral { .. });
+    let fits = is_integral
+        && is_linear_midpoint(system)
+        && experiment.excitation.is_none()
+        && !problem.is_regularised()
+        && point.parameters.len() == 3 * nodes;
+    let parts = |values: &'a [f64]| {
+        let (mass, others) = values.split_at(nodes);
+        let (damping, stiffness) = others.split_at(nodes);
+        [mass, damping, stiffness]
+    };
+    fits.then(|| SearchRay {
+        functions: parts(&point.parameters),
+        direction: parts(&point.gradient.l2),
+        initial: experiment.initial,
+        samples: channel.observed(),
+        step: system.grid.step(),
+    })
+}
+
+#[cfg(test)]
+mod tests;

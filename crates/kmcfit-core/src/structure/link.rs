@@ -5,14 +5,14 @@ use crate::simd::Real;
 
 /// Element between a coordinate and another one, or the ground; its elongation is `q_from - q_to`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Element {
+pub(crate) struct Link {
     pub law: Law,
     pub from: usize,
     /// `None` for the ground.
     pub to: Option<usize>,
 }
 
-impl Element {
+impl Link {
     /// Element between the only coordinate and the ground.
     pub const fn grounded(law: Law) -> Self {
         Self {

@@ -2,7 +2,6 @@ use super::*;
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::objective::GradientKind;
 use crate::record::{Channel, Experiment};
-use crate::solvers::methods::steepest_descent::lengths;
 use crate::solvers::{FitSettings, Solver};
 use crate::step::EngineMode;
 use crate::structure::Law;
@@ -53,14 +52,14 @@ fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     let evaluated = work.evaluate_into(&problem.start(), &mut evaluation);
     evaluated.expect("a motion");
     let mut points = vec![work.complete(problem.start(), evaluation)];
-    let mut spare = Vec::new();
+    let mut method = SteepestDescent::default();
     for _ in 0..steps {
         let point = points.last().expect("a point");
-        let lengths = lengths(point);
-        let ray = ray(problem, point).expect("the paper's problem");
-        let best = lowest(&mut work, point, ray, &lengths, &mut spare);
-        let best = best.expect("a lower cost");
-        points.push(work.complete(best.parameters, best.evaluation));
+        assert!(ray(problem, point).is_some(), "the paper's problem");
+        let Step::Moved { point, .. } = method.step(&mut work, point) else {
+            panic!("a lower cost");
+        };
+        points.push(*point);
     }
     points
 }

@@ -1,0 +1,13 @@
+//! Structures of any size, with explicit and implicit steps: matrices assembled from rows, and solved by banded factors.
+//!
+//! `stage` solves the equation of motion at one stage, `step` goes through the stages of a step, forwards and back, `sweeps` along a record.
+//! The small structures of [`Model`](super::stage::Model) are steps of the same methods in SIMD lanes.
+
+mod single;
+mod stage;
+mod step;
+mod sweeps;
+#[cfg(test)]
+mod tests;
+
+pub use sweeps::{Motion, MotionError, SupportMotion};

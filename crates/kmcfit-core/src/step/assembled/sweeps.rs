@@ -1,0 +1,284 @@
+//! Responses, tangents and adjoints of a structure along a record.
+
+use super::super::Trajectory;
+use super::super::error::Cause;
+use super::super::tableau::At;
+use super::stage::{StageShares, StageValues, Trouble};
+use super::step::{Source, Steps};
+use crate::structure::Structure;
+use crate::system::{Method, StageSamples};
+use thiserror::Error;
+
+/// A structure over a record: the values of its functions at the nodes, and what moves it.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// Coordinates, inertias, elements.
+    pub structure: &'a Structure,
+    /// Method of the steps.
+    pub method: Method,
+    /// Step, s.
+    pub step: f64,
+    /// Values of each function of the structure at the nodes, between which it is linear.
+    pub functions: &'a [&'a [f64]],
+    /// Forces (N) on coordinates.
+    pub forces: &'a [(usize, &'a StageSamples)],
+    /// Accelerations (m/s^2) of the frames relative to which coordinates are measured.
+    pub frames: &'a [(usize, &'a StageSamples)],
+    /// Motion of each support.
+    pub supports: &'a [SupportMotion<'a>],
+}
+
+/// The given motion of a support.
+#[derive(Debug, Clone, Copy)]
+pub struct SupportMotion<'a> {
+    /// Displacement, m.
+    pub displacement: &'a StageSamples,
+    /// Velocity, m/s.
+    pub velocity: &'a StageSamples,
+    /// Acceleration, m/s^2: it acts through inertias that join coordinates and supports.
+    pub acceleration: &'a StageSamples,
+}
+
+/// A motion that cannot be computed.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("{} in the step from node {node}", match .cause {
+    Cause::Mass => "the mass matrix is not positive definite",
+    Cause::NoConvergence => "Newton's method does not converge",
+    Cause::Overflow | Cause::CostOverflow => "the response overflows",
+})]
+pub struct MotionError {
+    /// Cause.
+    pub cause: Cause,
+    /// Node at the left end of the step.
+    pub node: usize,
+}
+
+/// Changes of the functions at the nodes; inputs do not change.
+struct Changes<'a>(&'a [&'a [f64]]);
+
+fn at_stage(values: &[f64], step: usize, at: At) -> f64 {
+    match at {
+        At::Left => values[step],
+        At::Middle => (values[step + 1] + values[step]) * 0.5,
+        At::Right => values[step + 1],
+    }
+}
+
+impl Source<f64> for Changes<'_> {
+    fn read(&self, step: usize, at: At, values: &mut StageValues<f64>) {
+        for (to, function) in values.functions.iter_mut().zip(self.0) {
+            *to = at_stage(function, step, at);
+        }
+    }
+}
+
+impl Source<f64> for Motion<'_> {
+    fn read(&self, step: usize, at: At, values: &mut StageValues<f64>) {
+        Changes(self.functions).read(step, at, values);
+        let sample = |samples: &StageSamples| samples.stages()[at as usize][step];
+        values.forces.fill(0.0);
+        for (coordinate, samples) in self.forces {
+            values.forces[*coordinate] += sample(samples);
+        }
+        values.frames.fill(0.0);
+        for (coordinate, samples) in self.frames {
+            values.frames[*coordinate] += sample(samples);
+        }
+        for (s, support) in self.supports.iter().enumerate() {
+            values.supports[0][s] = sample(support.displacement);
+            values.supports[1][s] = sample(support.velocity);
+            values.supports[2][s] = sample(support.acceleration);
+        }
+    }
+}
+
+impl<'a> Motion<'a> {
+    fn steps(&self) -> Steps<'a, f64> {
+        assert_eq!(
+            self.functions.len(),
+            self.structure.functions(),
+            "values of each function"
+        );
+        assert_eq!(
+            self.supports.len(),
+            self.structure.supports(),
+            "a motion of each support"
+        );
+        Steps::new(self.structure, self.method, self.step, 0.0)
+    }
+
+    /// Largest stable step, s, by the linear springs and dampers with their largest coefficients and the least inertias; infinite for the
+    /// implicit method. `None` where the mass matrix is not positive definite.
+    pub fn largest_stable_step(&self) -> Option<f64> {
+        let inertias = self.structure.inertias().len();
+        let extremes = self.functions.iter().enumerate().map(|(f, values)| {
+            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if f < inertias { least } else { largest }
+        });
+        let rate = self
+            .structure
+            .largest_rate(&extremes.collect::<Vec<f64>>())?;
+        Some(self.method.stability_limit() / rate)
+    }
+
+    fn error(node: usize, trouble: Trouble) -> MotionError {
+        let cause = match trouble {
+            Trouble::Mass => Cause::Mass,
+            Trouble::Newton => Cause::NoConvergence,
+        };
+        MotionError { cause, node }
+    }
+
+    /// Response from the state `initial`: the displacements of all coordinates, then their velocities. `states` gives the number of nodes.
+    ///
+    /// # Errors
+    /// A [`MotionError`] if the mass matrix is not positive definite, an implicit step is not solved, or the response overflows.
+    ///
+    /// # Panics
+    /// If functions, inputs or states do not fit the structure.
+    pub fn respond(&self, initial: &[f64], states: &mut Trajectory) -> Result<(), MotionError> {
+        let mut steps = self.steps();
+        let mut x = initial.to_vec();
+        states.write(0, &x);
+        for i in 0..states.nodes() - 1 {
+            (steps.advance(self, i, &mut x)).map_err(|trouble| Self::error(i, trouble))?;
+            states.write(i + 1, &x);
+        }
+        match states.is_finite() {
+            true => Ok(()),
+            false => {
+                let finite = (0..states.nodes()).take_while(|i| states.is_finite_at(*i));
+                Err(MotionError {
+                    cause: Cause::Overflow,
+                    node: finite.count().saturating_sub(1),
+                })
+            }
+        }
+    }
+
+    /// Derivatives of a cost of the response `states` with the derivatives `source` by the states at all nodes: those by the functions' values
+    /// at the nodes are added to `gradient`, those by the initial state are returned. The exact transpose of [`Motion::tangent`].
+    ///
+    /// # Errors
+    /// As [`Motion::respond`].
+    ///
+    /// # Panics
+    /// If the arguments do not fit the structure.
+    pub fn adjoint(
+        &self,
+        states: &Trajectory,
+        source: &Trajectory,
+        gradient: &mut [&mut [f64]],
+    ) -> Result<Vec<f64>, MotionError> {
+        let mut steps = self.steps();
+        let mut shares = StageShares::zeros(self.structure);
+        let zeros = vec![0.0; states.components()];
+        let (mut x, mut next) = (zeros.clone(), zeros.clone());
+        let (mut y, mut push) = (zeros.clone(), zeros);
+        let last = states.nodes() - 1;
+        source.read(last, &mut y);
+        for i in (0..last).rev() {
+            states.read(i, &mut x);
+            states.read(i + 1, &mut next);
+            (steps.linearise(self, i, &mut x, Some(&next)))
+                .map_err(|trouble| Self::error(i, trouble))?;
+            steps.pull(&mut y, &mut shares, |at, shares| {
+                for (gradient, share) in gradient.iter_mut().zip(&shares.functions) {
+                    let [left, right] = at.shares();
+                    gradient[i] += left * share;
+                    gradient[i + 1] += right * share;
+                }
+            });
+            source.read(i, &mut push);
+            y.iter_mut().zip(&push).for_each(|(y, push)| *y += push);
+        }
+        Ok(y)
+    }
+
+    /// Derivative of the response `states` along changes of the functions' values at the nodes and of the initial state.
+    ///
+    /// # Errors
+    /// As [`Motion::respond`].
+    ///
+    /// # Panics
+    /// If the arguments do not fit the structure.
+    pub fn tangent(
+        &self,
+        states: &Trajectory,
+        functions: &[&[f64]],
+        initial: &[f64],
+    ) -> Result<Trajectory, MotionError> {
+        let mut steps = self.steps();
+        let mut out = Trajectory::zeros(self.structure.coordinates(), states.nodes());
+        let zeros = vec![0.0; states.components()];
+        let (mut x, mut next, mut change) = (zeros.clone(), zeros, initial.to_vec());
+        out.write(0, &change);
+        for i in 0..states.nodes() - 1 {
+            states.read(i, &mut x);
+            states.read(i + 1, &mut next);
+            (steps.linearise(self, i, &mut x, Some(&next)))
+                .map_err(|trouble| Self::error(i, trouble))?;
+            steps.push(&Changes(functions), i, &mut change);
+            out.write(i + 1, &change);
+        }
+        Ok(out)
+    }
+
+    /// The state after step `i` from the state `x`, and for each of its components the multipliers of the state before the step and the
+    /// derivatives by the functions, forces and frames at both nodes, between which they are linear.
+    pub(crate) fn step_derivatives(
+        &self,
+        i: usize,
+        x: &mut [f64],
+    ) -> Result<Vec<StepRow>, Trouble> {
+        let mut steps = self.steps();
+        steps.linearise(self, i, x, None)?;
+        let mut shares = StageShares::zeros(self.structure);
+        let rows = (0..x.len()).map(|end| {
+            let mut row = StepRow::zeros(self.structure);
+            row.state[end] = 1.0;
+            let StepRow {
+                state,
+                functions,
+                forces,
+                frames,
+            } = &mut row;
+            steps.pull(state, &mut shares, |at, shares| {
+                add(at, &shares.functions, functions);
+                add(at, &shares.forces, forces);
+                add(at, &shares.frames, frames);
+            });
+            row
+        });
+        Ok(rows.collect())
+    }
+}
+
+fn add(at: At, shares: &[f64], to: &mut [[f64; 2]]) {
+    let [left, right] = at.shares();
+    for (to, share) in to.iter_mut().zip(shares) {
+        to[0] += left * share;
+        to[1] += right * share;
+    }
+}
+
+/// Derivatives of one component of the state after a step.
+pub(crate) struct StepRow {
+    pub state: Vec<f64>,
+    pub functions: Vec<[f64; 2]>,
+    pub forces: Vec<[f64; 2]>,
+    pub frames: Vec<[f64; 2]>,
+}
+
+impl StepRow {
+    fn zeros(structure: &Structure) -> Self {
+        let n = structure.coordinates();
+        Self {
+            state: vec![0.0; 2 * n],
+            functions: vec![[0.0; 2]; structure.functions()],
+            forces: vec![[0.0; 2]; n],
+            frames: vec![[0.0; 2]; n],
+        }
+    }
+}

@@ -1,0 +1,583 @@
+//! Structures of any size: derivatives against dual numbers, responses against closed forms and the compiled sizes.
+
+use super::super::tableau::At;
+use super::stage::{Scalar, StageValues};
+use super::step::{Source, Steps};
+use super::{Motion, SupportMotion};
+use crate::step::{Cause, Trajectory};
+use crate::structure::{Ends, Law, Structure, StructureError};
+use crate::system::{Method, StageSamples};
+use num_dual::Dual64;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+impl Scalar for Dual64 {
+    const FURTHER: u32 = 2;
+
+    fn value(self) -> f64 {
+        self.re
+    }
+}
+
+const METHODS: [Method; 3] = [Method::Midpoint, Method::Rk4, Method::ImplicitMidpoint];
+const LAWS: [Law; 8] = [
+    Law::Damping,
+    Law::Stiffness,
+    Law::QuadraticStiffness,
+    Law::CubicStiffness,
+    Law::QuinticStiffness,
+    Law::QuadraticDamping,
+    Law::CoulombFriction { width: 0.2 },
+    Law::Offset,
+];
+
+/// A structure with random rows, values and inputs.
+struct Case {
+    structure: Structure,
+    functions: Vec<Vec<f64>>,
+    /// Forces, then frames, of each coordinate; displacements, velocities and accelerations of each support.
+    inputs: [Vec<StageSamples>; 2],
+    supports: Vec<[StageSamples; 3]>,
+    initial: Vec<f64>,
+    step: f64,
+}
+
+fn series(random: &mut impl Rng, nodes: usize) -> Vec<f64> {
+    (0..nodes).map(|_| random.random_range(-1.0..1.0)).collect()
+}
+
+/// Samples with jumps at nodes.
+fn samples(random: &mut impl Rng, nodes: usize) -> StageSamples {
+    let steps = (1..nodes).map(|_| std::array::from_fn(|_| random.random_range(-1.0..1.0)));
+    StageSamples::new(steps.collect::<Vec<[f64; 3]>>())
+}
+
+impl Case {
+    fn new(seed: u64, n: usize, supports: usize, nodes: usize) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let ends = |random: &mut ChaCha8Rng| {
+            let mut entries = vec![(random.random_range(0..n), 1.0)];
+            for _ in 0..random.random_range(0..3) {
+                entries.push((
+                    random.random_range(0..n + supports),
+                    random.random_range(-1.0..1.0),
+                ));
+            }
+            Ends::combination(entries)
+        };
+        let mut inertias: Vec<Ends> = (0..n).map(Ends::ground).collect();
+        inertias.extend((0..2).map(|_| ends(&mut random)));
+        let mut elements: Vec<(Law, Ends)> = (0..n)
+            .flat_map(|j| {
+                [
+                    (Law::Damping, Ends::ground(j)),
+                    (Law::Stiffness, Ends::ground(j)),
+                ]
+            })
+            .collect();
+        elements.extend(LAWS.map(|law| (law, ends(&mut random))));
+        let levels =
+            inertias
+                .iter()
+                .map(|_| 1.5)
+                .chain(elements.iter().map(|(law, _)| match law {
+                    Law::Stiffness => 3.0,
+                    _ => 0.3,
+                }));
+        let functions = levels
+            .map(|level| {
+                series(&mut random, nodes)
+                    .iter()
+                    .map(|x| level * (1.0 + 0.3 * x))
+                    .collect()
+            })
+            .collect();
+        let inputs = [0, 1].map(|_| (0..n).map(|_| samples(&mut random, nodes)).collect());
+        let motion = |random: &mut ChaCha8Rng| [0, 1, 2].map(|_| samples(random, nodes));
+        Self {
+            structure: Structure::new(n, supports, inertias, elements).expect("a structure"),
+            functions,
+            inputs,
+            supports: (0..supports).map(|_| motion(&mut random)).collect(),
+            initial: series(&mut random, 2 * n),
+            step: 0.05,
+        }
+    }
+
+    fn with<T>(&self, method: Method, call: impl FnOnce(&Motion) -> T) -> T {
+        let functions: Vec<&[f64]> = self.functions.iter().map(Vec::as_slice).collect();
+        let [forces, frames] = self.inputs.each_ref().map(|inputs| {
+            let each = inputs.iter().enumerate();
+            each.collect::<Vec<(usize, &StageSamples)>>()
+        });
+        let supports = self
+            .supports
+            .iter()
+            .map(|[displacement, velocity, acceleration]| SupportMotion {
+                displacement,
+                velocity,
+                acceleration,
+            });
+        call(&Motion {
+            structure: &self.structure,
+            method,
+            step: self.step,
+            functions: &functions,
+            forces: &forces,
+            frames: &frames,
+            supports: &supports.collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// Values of a motion with their changes: of functions at the nodes, and of forces and frames, linear between nodes.
+struct Along<'a> {
+    motion: &'a Motion<'a>,
+    functions: &'a [Vec<f64>],
+    inputs: [&'a [Vec<f64>]; 2],
+}
+
+impl Source<Dual64> for Along<'_> {
+    fn read(&self, step: usize, at: At, values: &mut StageValues<Dual64>) {
+        let mut real = StageValues::zeros(self.motion.structure, 0.0);
+        self.motion.read(step, at, &mut real);
+        let [left, right] = at.shares();
+        let change = |nodes: &[f64]| left * nodes[step] + right * nodes[step + 1];
+        let set = |to: &mut [Dual64], values: &[f64], changes: &[Vec<f64>]| {
+            for ((to, value), nodes) in to.iter_mut().zip(values).zip(changes) {
+                *to = Dual64::new(*value, change(nodes));
+            }
+        };
+        set(&mut values.functions, &real.functions, self.functions);
+        set(&mut values.forces, &real.forces, self.inputs[0]);
+        set(&mut values.frames, &real.frames, self.inputs[1]);
+        for (to, from) in values.supports.iter_mut().zip(&real.supports) {
+            to.iter_mut()
+                .zip(from)
+                .for_each(|(to, x)| *to = Dual64::from(*x));
+        }
+    }
+}
+
+fn close(found: f64, exact: f64, size: f64, what: &str) {
+    assert!(
+        (found - exact).abs() <= 1e-12 * size,
+        "{what}: {found} {exact} ({size})"
+    );
+}
+
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+/// Responses, tangents, adjoints and derivatives by inputs of a case.
+fn check(case: &Case, method: Method, nodes: usize) {
+    let n = case.structure.coordinates();
+    case.with(method, |motion| {
+        let mut states = Trajectory::zeros(n, nodes);
+        motion
+            .respond(&case.initial, &mut states)
+            .expect("a motion");
+        let mut random = ChaCha8Rng::seed_from_u64(99);
+        let functions: Vec<Vec<f64>> = case
+            .functions
+            .iter()
+            .map(|_| series(&mut random, nodes))
+            .collect();
+        let initial = series(&mut random, 2 * n);
+        let zeros = vec![vec![0.0; nodes]; n];
+        let inputs: [Vec<Vec<f64>>; 2] =
+            [0, 1].map(|_| (0..n).map(|_| series(&mut random, nodes)).collect());
+
+        // By dual numbers, along functions and initial state, and along forces and frames.
+        let by_dual = |inputs: [&[Vec<f64>]; 2], functions: &[Vec<f64>], initial: &[f64]| {
+            let zero = Dual64::from(0.0);
+            let mut steps = Steps::new(&case.structure, method, case.step, zero);
+            let source = Along {
+                motion,
+                functions,
+                inputs,
+            };
+            let mut x: Vec<Dual64> = case
+                .initial
+                .iter()
+                .zip(initial)
+                .map(|(x, dx)| Dual64::new(*x, *dx))
+                .collect();
+            let mut all = vec![x.clone()];
+            for i in 0..nodes - 1 {
+                steps.advance(&source, i, &mut x).expect("a step");
+                all.push(x.clone());
+            }
+            all
+        };
+        let exact = by_dual([&zeros, &zeros], &functions, &initial);
+        let slices: Vec<&[f64]> = functions.iter().map(Vec::as_slice).collect();
+        let tangent = motion
+            .tangent(&states, &slices, &initial)
+            .expect("a tangent");
+        let size = largest(exact.iter().flatten().map(|x| x.eps));
+        for (i, exact) in exact.iter().enumerate() {
+            for (c, exact) in exact.iter().enumerate() {
+                close(states.component(c)[i], exact.re, 10.0, "a response");
+                close(tangent.component(c)[i], exact.eps, size, "a tangent");
+            }
+        }
+
+        // A cost that is linear in the states.
+        let source: Vec<Vec<f64>> = (0..2 * n).map(|_| series(&mut random, nodes)).collect();
+        let source = Trajectory::of_columns(&source.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let mut gradient = vec![vec![0.0; nodes]; functions.len()];
+        let mut columns: Vec<&mut [f64]> = gradient.iter_mut().map(Vec::as_mut_slice).collect();
+        let by_initial = motion
+            .adjoint(&states, &source, &mut columns)
+            .expect("an adjoint");
+        let products = gradient.iter().flatten().zip(functions.iter().flatten());
+        let products = products.chain(by_initial.iter().zip(&initial));
+        let products: Vec<f64> = products.map(|(a, b)| a * b).collect();
+        let cost = (0..2 * n).flat_map(|c| {
+            let of = |i: usize| source.component(c)[i] * exact[i][c].eps;
+            (0..nodes).map(of).collect::<Vec<f64>>()
+        });
+        let size = products.iter().map(|x| x.abs()).sum();
+        close(products.iter().sum(), cost.sum(), size, "the adjoint");
+
+        let nothing: Vec<Vec<f64>> = functions.iter().map(|f| vec![0.0; f.len()]).collect();
+        let exact = by_dual([&inputs[0], &inputs[1]], &nothing, &vec![0.0; 2 * n]);
+        let size = largest(exact.iter().flatten().map(|x| x.eps));
+        let mut change = vec![0.0; 2 * n];
+        for i in 0..nodes - 1 {
+            let mut x: Vec<f64> = (0..2 * n).map(|c| states.component(c)[i]).collect();
+            let rows = motion.step_derivatives(i, &mut x).expect("a step");
+            let next = rows.iter().map(|row| {
+                let of_state = row.state.iter().zip(&change).map(|(a, b)| a * b);
+                let by = [&row.forces, &row.frames]
+                    .into_iter()
+                    .zip(&inputs)
+                    .flat_map(|(by, values)| {
+                        by.iter()
+                            .zip(values)
+                            .map(|([left, right], values)| left * values[i] + right * values[i + 1])
+                    });
+                of_state.chain(by).sum::<f64>()
+            });
+            change = next.collect();
+            for (found, exact) in change.iter().zip(&exact[i + 1]) {
+                close(*found, exact.eps, size, "a derivative by inputs");
+            }
+        }
+    });
+}
+
+#[test]
+fn derivatives_are_those_of_dual_numbers() {
+    for (seed, (n, supports)) in [(1, 0), (1, 1), (2, 0), (3, 2), (5, 1), (12, 3)]
+        .into_iter()
+        .enumerate()
+    {
+        for nodes in [2, 60] {
+            let case = Case::new(seed as u64, n, supports, nodes);
+            METHODS
+                .iter()
+                .for_each(|method| check(&case, *method, nodes));
+        }
+    }
+}
+
+/// A chain of equal masses and springs with a fixed first end; the other end is free.
+fn chain(n: usize, laws: &[Law]) -> Structure {
+    let ends = |j: usize| match j {
+        0 => Ends::ground(0),
+        _ => Ends::between(j, j - 1),
+    };
+    let elements = (0..n).flat_map(|j| laws.iter().map(move |law| (*law, ends(j))));
+    Structure::new(n, 0, (0..n).map(Ends::ground).collect(), elements.collect()).expect("a chain")
+}
+
+/// Frequencies `2 sqrt(k/m) sin((2 j - 1) pi / (4 n + 2))` of a chain with a free end.
+fn frequency(n: usize, j: usize) -> f64 {
+    let angle = (2 * j - 1) as f64 * std::f64::consts::PI / (4 * n + 2) as f64;
+    2.0 * 4.0f64.sqrt() * angle.sin()
+}
+
+#[test]
+fn natural_frequencies_are_those_of_a_chain() {
+    let structure = chain(12, &[Law::Damping, Law::Stiffness]);
+    let values: Vec<f64> = (0..36)
+        .map(|f| if f < 12 { 1.0 } else { [0.1, 4.0][f % 2] })
+        .collect();
+    let found = structure.eigenvalues(&values).expect("masses");
+    for (j, square) in (1..).zip(&found) {
+        assert!(
+            (square.sqrt() - frequency(12, j)).abs() < 1e-12,
+            "{j}: {square}"
+        );
+    }
+    assert_eq!(structure.largest_rate(&values), Some(found[11].sqrt()));
+}
+
+/// Superposition of two modes of a chain of five masses: orders of all methods, and the exact response of the implicit rule, whose modes
+/// keep their energy at the frequency `2 atan(omega h / 2) / h`.
+#[test]
+fn responses_converge_to_modes_with_the_order_of_the_method() {
+    let (n, duration) = (5, 8.0);
+    let structure = chain(n, &[Law::Stiffness]);
+    let shape = |j: usize| -> Vec<f64> {
+        let angle = (2 * j - 1) as f64 * std::f64::consts::PI / (2 * n + 1) as f64;
+        (1..=n).map(|i| (i as f64 * angle).sin()).collect()
+    };
+    let modes = [(1, 0.8), (4, -0.3)];
+    let error = |method: Method, nodes: usize, implicit: bool| -> f64 {
+        let h = duration / (nodes - 1) as f64;
+        let values: Vec<Vec<f64>> = (0..2 * n)
+            .map(|f| vec![if f < n { 1.0 } else { 4.0 }; nodes])
+            .collect();
+        let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let motion = Motion {
+            structure: &structure,
+            method,
+            step: h,
+            functions: &functions,
+            forces: &[],
+            frames: &[],
+            supports: &[],
+        };
+        let mut initial = vec![0.0; 2 * n];
+        for (j, size) in modes {
+            initial
+                .iter_mut()
+                .zip(shape(j))
+                .for_each(|(x, s)| *x += size * s);
+        }
+        let mut states = Trajectory::zeros(n, nodes);
+        motion.respond(&initial, &mut states).expect("a motion");
+        let exact = |t: f64, i: usize| -> f64 {
+            let of = |(j, size): (usize, f64)| {
+                let omega = frequency(n, j);
+                let omega = match implicit {
+                    true => 2.0 * (0.5 * omega * h).atan() / h,
+                    false => omega,
+                };
+                size * shape(j)[i] * (omega * t).cos()
+            };
+            modes.into_iter().map(of).sum()
+        };
+        largest(
+            (0..nodes)
+                .flat_map(|i| (0..n).map(move |c| (i, c)))
+                .map(|(i, c)| states.displacement(c)[i] - exact(i as f64 * h, c)),
+        )
+    };
+    for method in METHODS {
+        let [coarse, fine] = [401, 801].map(|nodes| error(method, nodes, false));
+        let order = (coarse / fine).log2();
+        assert!(
+            (order - f64::from(method.order())).abs() < 0.1,
+            "{method:?}: {order}"
+        );
+    }
+    // Also with steps that no explicit method allows.
+    for nodes in [9, 101] {
+        let error = error(Method::ImplicitMidpoint, nodes, true);
+        assert!(error < 1e-13 * 100.0, "{nodes}: {error}");
+    }
+}
+
+/// Just below the largest stable step an undamped chain keeps its size for thousands of steps, above it does not.
+#[test]
+fn the_largest_stable_step_is_the_limit() {
+    let structure = chain(6, &[Law::Stiffness]);
+    let nodes = 4001;
+    let values: Vec<Vec<f64>> = (0..12)
+        .map(|f| vec![if f < 6 { 1.0 } else { 4.0 }; nodes])
+        .collect();
+    let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let mut motion = Motion {
+        structure: &structure,
+        method: Method::Rk4,
+        step: f64::NAN,
+        functions: &functions,
+        forces: &[],
+        frames: &[],
+        supports: &[],
+    };
+    let limit = motion.largest_stable_step().expect("masses");
+    assert_eq!(
+        limit,
+        2.5 / structure
+            .largest_rate(&[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0])
+            .expect("masses")
+    );
+    let size = |motion: &Motion| {
+        let mut states = Trajectory::zeros(6, nodes);
+        let initial = [
+            1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        ];
+        match motion.respond(&initial, &mut states) {
+            Ok(()) => largest(states.displacement(5).iter().copied()),
+            Err(_) => f64::INFINITY,
+        }
+    };
+    motion.step = limit;
+    assert!(size(&motion) < 10.0);
+    motion.step = 1.15 * limit;
+    assert!(size(&motion) > 1e6);
+    motion.method = Method::ImplicitMidpoint;
+    assert_eq!(motion.largest_stable_step(), Some(f64::INFINITY));
+    assert!(size(&motion) < 10.0);
+}
+
+/// A support that moves and a frame that moves with it give the same motion but for the error of the method.
+#[test]
+fn a_moving_support_is_a_moving_frame() {
+    let base = |t: f64| {
+        [
+            (2.0 * t).sin(),
+            2.0 * (2.0 * t).cos(),
+            -4.0 * (2.0 * t).sin(),
+        ]
+    };
+    let laws = [
+        (Law::Damping, 0.2),
+        (Law::Stiffness, 3.0),
+        (Law::CubicStiffness, 0.5),
+    ];
+    let difference = |method: Method, nodes: usize| -> f64 {
+        let h = 6.0 / (nodes - 1) as f64;
+        let at = |part: usize| {
+            let value = |t: f64| base(t)[part];
+            let step = |i: usize| [0.0, 0.5, 1.0].map(|s| value(h * (i as f64 + s)));
+            StageSamples::new((0..nodes - 1).map(step).collect::<Vec<_>>())
+        };
+        let [displacement, velocity, acceleration] = [0, 1, 2].map(at);
+        let values: Vec<Vec<f64>> = [1.5]
+            .into_iter()
+            .chain(laws.map(|(_, p)| p))
+            .map(|p| vec![p; nodes])
+            .collect();
+        let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let supports = [SupportMotion {
+            displacement: &displacement,
+            velocity: &velocity,
+            acceleration: &acceleration,
+        }];
+        let frames = [(0, &acceleration)];
+        let respond = |moves: bool, initial: [f64; 2]| {
+            let ends = |moves: bool| {
+                if moves {
+                    Ends::between(0, 1)
+                } else {
+                    Ends::ground(0)
+                }
+            };
+            let elements = laws.map(|(law, _)| (law, ends(moves))).to_vec();
+            let structure = Structure::new(1, usize::from(moves), vec![Ends::ground(0)], elements);
+            let motion = Motion {
+                structure: &structure.expect("a structure"),
+                method,
+                step: h,
+                functions: &functions,
+                forces: &[],
+                frames: if moves { &[] } else { &frames },
+                supports: if moves { &supports } else { &[] },
+            };
+            let mut states = Trajectory::zeros(1, nodes);
+            motion.respond(&initial, &mut states).expect("a motion");
+            states
+        };
+        let [y, v, _] = base(0.0);
+        let (absolute, relative) = (respond(true, [0.4 + y, v]), respond(false, [0.4, 0.0]));
+        largest((0..nodes).map(|i| {
+            absolute.displacement(0)[i] - relative.displacement(0)[i] - base(h * i as f64)[0]
+        }))
+    };
+    for method in METHODS {
+        let [coarse, fine] = [201, 401].map(|nodes| difference(method, nodes));
+        let order = (coarse / fine).log2();
+        assert!(
+            (order - f64::from(method.order())).abs() < 0.3,
+            "{method:?}: {order}"
+        );
+    }
+}
+
+/// The consistent mass of a bar, `m/6 (2 1; 1 2)`, as three rows.
+#[test]
+fn a_consistent_mass_is_a_sum_of_rows() {
+    let rows = [
+        Ends::ground(0),
+        Ends::ground(1),
+        Ends::combination([(0, 1.0), (1, 1.0)]),
+    ];
+    let structure = Structure::new(
+        2,
+        0,
+        rows.to_vec(),
+        vec![(Law::Stiffness, Ends::between(0, 1))],
+    );
+    let structure = structure.expect("a structure");
+    // Frequencies of a free element of mass 6 and stiffness 1: 0 and sqrt(12 k/m).
+    let squares = structure
+        .eigenvalues(&[1.0, 1.0, 1.0, 1.0])
+        .expect("masses");
+    assert!(
+        squares[0].abs() < 1e-15 && (squares[1] - 2.0).abs() < 1e-14,
+        "{squares:?}"
+    );
+}
+
+#[test]
+fn a_structure_without_meaning_is_refused() {
+    let spring = |ends| vec![(Law::Stiffness, ends)];
+    let masses = || vec![Ends::ground(0), Ends::ground(1)];
+    let new = |n, inertias, elements| Structure::new(n, 1, inertias, elements).map(|_| ());
+    assert_eq!(new(2, masses(), spring(Ends::between(0, 2))), Ok(()));
+    assert_eq!(new(0, vec![], vec![]), Err(StructureError::NoCoordinate));
+    assert_eq!(
+        new(2, masses(), spring(Ends::ground(3))),
+        Err(StructureError::NoSuchEnd {
+            function: 2,
+            index: 3,
+            coordinates: 2,
+            supports: 1
+        })
+    );
+    assert_eq!(
+        new(2, masses(), spring(Ends::ground(2))),
+        Err(StructureError::NoEnd(2))
+    );
+    assert_eq!(
+        new(2, vec![Ends::ground(0)], vec![]),
+        Err(StructureError::NoInertia(1))
+    );
+}
+
+#[test]
+fn what_cannot_be_computed_is_named() {
+    let structure = chain(2, &[Law::Stiffness, Law::CubicStiffness]);
+    let attempt = |mass: f64, cubic: f64, method| {
+        let values: Vec<Vec<f64>> = [mass, mass, 1.0, cubic, 1.0, cubic]
+            .iter()
+            .map(|p| vec![*p; 101])
+            .collect();
+        let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let motion = Motion {
+            structure: &structure,
+            method,
+            step: 0.1,
+            functions: &functions,
+            forces: &[],
+            frames: &[],
+            supports: &[],
+        };
+        let mut states = Trajectory::zeros(2, 101);
+        motion
+            .respond(&[1.0, 2.0, 0.0, 0.0], &mut states)
+            .map_err(|error| error.cause)
+    };
+    assert_eq!(attempt(-1.0, 0.0, Method::Rk4), Err(Cause::Mass));
+    assert_eq!(attempt(1.0, -30.0, Method::Rk4), Err(Cause::Overflow));
+    for cubic in [0.5, 30.0, 3000.0] {
+        assert_eq!(attempt(1.0, cubic, Method::ImplicitMidpoint), Ok(()));
+    }
+}

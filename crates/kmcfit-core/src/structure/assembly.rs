@@ -1,0 +1,214 @@
+//! A structure as one table of inertias and elements.
+
+use super::banded::Banded;
+use super::{Ends, Law};
+use nalgebra::DMatrix;
+use thiserror::Error;
+
+/// A structure of any number of coordinates:
+///
+/// ```text
+/// sum_r b_r m_r(t) b_r (q'' + g'') + sum_e b_e p_e(t) phi_e(b_e q, b_e q') = f(t)
+/// ```
+///
+/// with the coordinates `q` (m or rad), relative to frames that move by `g`, and supports whose motion is given; the rows `b` are [`Ends`].
+/// Its functions of time are the inertias `m_r` (kg), then the coefficients `p_e` of the elements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Structure {
+    coordinates: usize,
+    supports: usize,
+    inertias: Vec<Ends>,
+    elements: Vec<(Law, Ends)>,
+    /// Places in a banded matrix, and values there, of `b b^T` for the row of each function.
+    patterns: Vec<Vec<(usize, f64)>>,
+    bandwidth: usize,
+}
+
+/// A structure that cannot be made.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum StructureError {
+    /// There is no coordinate.
+    #[error("a structure has at least one coordinate")]
+    NoCoordinate,
+    /// An end is neither a coordinate nor a support.
+    #[error(
+        "end {index} of function {function}: there are {coordinates} coordinates and {supports} supports"
+    )]
+    NoSuchEnd {
+        /// Index of the function, inertias first.
+        function: usize,
+        /// Index of the end.
+        index: usize,
+        /// Number of coordinates.
+        coordinates: usize,
+        /// Number of supports.
+        supports: usize,
+    },
+    /// An inertia or element acts on no coordinate.
+    #[error("function {0} acts on no coordinate")]
+    NoEnd(usize),
+    /// No inertia acts on a coordinate.
+    #[error("no inertia acts on coordinate {0}")]
+    NoInertia(usize),
+}
+
+impl Structure {
+    /// A structure of `coordinates` coordinates and `supports` supports with the rows of its inertias and its elements.
+    ///
+    /// # Errors
+    /// A [`StructureError`] for an end that does not exist, a row without one, or a coordinate without inertia.
+    pub fn new(
+        coordinates: usize,
+        supports: usize,
+        inertias: Vec<Ends>,
+        elements: Vec<(Law, Ends)>,
+    ) -> Result<Self, StructureError> {
+        if coordinates == 0 {
+            return Err(StructureError::NoCoordinate);
+        }
+        let mut has_inertia = vec![false; coordinates];
+        let mut bandwidth = 0;
+        let rows = inertias.iter().chain(elements.iter().map(|(_, ends)| ends));
+        for (function, ends) in rows.clone().enumerate() {
+            let beyond = ends
+                .entries()
+                .iter()
+                .find(|(j, _)| *j >= coordinates + supports);
+            if let Some((index, _)) = beyond {
+                return Err(StructureError::NoSuchEnd {
+                    function,
+                    index: *index,
+                    coordinates,
+                    supports,
+                });
+            }
+            let (Some(first), Some(last)) = (
+                free(ends, coordinates).map(|(j, _)| j).min(),
+                free(ends, coordinates).map(|(j, _)| j).max(),
+            ) else {
+                return Err(StructureError::NoEnd(function));
+            };
+            bandwidth = bandwidth.max(last - first);
+            if function < inertias.len() {
+                free(ends, coordinates).for_each(|(j, _)| has_inertia[j] = true);
+            }
+        }
+        if let Some(j) = has_inertia.iter().position(|has| !has) {
+            return Err(StructureError::NoInertia(j));
+        }
+        let pattern = |ends: &Ends| -> Vec<(usize, f64)> {
+            let pairs = free(ends, coordinates).flat_map(|(i, a)| {
+                let other = free(ends, coordinates).filter(move |(j, _)| *j <= i);
+                other.map(move |(j, b)| (Banded::<f64>::place(bandwidth, i, j), a * b))
+            });
+            pairs.collect()
+        };
+        let patterns = rows.map(pattern).collect();
+        Ok(Self {
+            coordinates,
+            supports,
+            inertias,
+            elements,
+            patterns,
+            bandwidth,
+        })
+    }
+
+    /// One coordinate with its mass and these elements.
+    pub(crate) fn one(elements: Vec<(Law, Ends)>) -> Self {
+        let patterns = vec![vec![(0, 1.0)]; 1 + elements.len()];
+        Self {
+            coordinates: 1,
+            supports: 0,
+            inertias: vec![Ends::ground(0)],
+            elements,
+            patterns,
+            bandwidth: 0,
+        }
+    }
+
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.coordinates
+    }
+
+    /// Number of supports, whose indices follow those of the coordinates.
+    pub fn supports(&self) -> usize {
+        self.supports
+    }
+
+    /// Number of functions of time: inertias and coefficients of elements.
+    pub fn functions(&self) -> usize {
+        self.patterns.len()
+    }
+
+    /// Rows of the inertias.
+    pub fn inertias(&self) -> &[Ends] {
+        &self.inertias
+    }
+
+    /// Laws and rows of the elements.
+    pub fn elements(&self) -> &[(Law, Ends)] {
+        &self.elements
+    }
+
+    pub(crate) fn is_linear(&self) -> bool {
+        self.elements.iter().all(|(law, _)| law.is_linear())
+    }
+
+    pub(crate) fn bandwidth(&self) -> usize {
+        self.bandwidth
+    }
+
+    /// `b b^T` of function `f` as places and values of a [`Banded`] matrix.
+    pub(crate) fn pattern(&self, f: usize) -> &[(usize, f64)] {
+        &self.patterns[f]
+    }
+
+    /// Squares of the natural frequencies, 1/s^2, in ascending order, for values of the functions, by the linear springs alone; `None`
+    /// where the mass matrix is not positive definite.
+    pub fn eigenvalues(&self, functions: &[f64]) -> Option<Vec<f64>> {
+        self.relative_to_mass(Law::Stiffness, functions)
+    }
+
+    /// A bound of the rates `|lambda|`, 1/s, of solutions `exp(lambda t)`: the square root of the largest eigenvalue of the linear springs, or
+    /// the largest one of the linear dampers, whichever is larger. It holds for coefficients that are not negative, and for functions of
+    /// time with the least inertias and the largest coefficients.
+    pub fn largest_rate(&self, functions: &[f64]) -> Option<f64> {
+        let largest = |law| Some(self.relative_to_mass(law, functions)?.last()?.max(0.0));
+        Some(largest(Law::Stiffness)?.sqrt().max(largest(Law::Damping)?))
+    }
+
+    /// Eigenvalues of the matrix of all elements of a law relative to the mass matrix, ascending.
+    fn relative_to_mass(&self, law: Law, functions: &[f64]) -> Option<Vec<f64>> {
+        let n = self.coordinates;
+        let count = self.inertias.len();
+        let sum = |wanted: &dyn Fn(usize) -> bool| {
+            let mut matrix = DMatrix::zeros(n, n);
+            let rows = self
+                .inertias
+                .iter()
+                .chain(self.elements.iter().map(|(_, ends)| ends));
+            for (f, ends) in rows.enumerate().filter(|(f, _)| wanted(*f)) {
+                for (i, a) in free(ends, n) {
+                    free(ends, n).for_each(|(j, b)| matrix[(i, j)] += functions[f] * a * b);
+                }
+            }
+            matrix
+        };
+        let mass = sum(&|f| f < count).cholesky()?;
+        let of_law = sum(&|f| f >= count && self.elements[f - count].0 == law);
+        let half = mass.l().solve_lower_triangular(&of_law)?;
+        let mut whole = mass.l().solve_lower_triangular(&half.transpose())?;
+        whole = 0.5 * (&whole + whole.transpose());
+        let mut values: Vec<f64> = whole.symmetric_eigenvalues().iter().copied().collect();
+        values.sort_by(f64::total_cmp);
+        Some(values)
+    }
+}
+
+/// The entries of a row that are coordinates.
+fn free(ends: &Ends, coordinates: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
+    let entries = ends.entries().iter().copied();
+    entries.filter(move |(j, _)| *j < coordinates)
+}
