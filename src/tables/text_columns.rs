@@ -62,8 +62,8 @@ impl Table {
         }
     }
 
-    /// Takes the units of a line such as `# units: s, N, g` before the rows, where it has as many as there are columns; another number of units
-    /// is stated and not applied.
+    /// Takes the units of a line such as `# units: s, N, g` before the rows, where it has as many as there are columns, or one less beside times;
+    /// another number of units is stated and not applied.
     pub(super) fn units_by_preamble(&mut self, text: &str, delimiter: char) {
         let before = self.lines.first().map_or(0, |line| line.saturating_sub(1));
         let stated = text.lines().take(before).find_map(|line| {
@@ -78,10 +78,11 @@ impl Table {
         let Some(stated) = stated.filter(|_| self.units.is_empty()) else {
             return;
         };
-        let mut signs = std::iter::once(delimiter).chain(DELIMITERS);
-        let is_unit = |text: &String| text == "-" || Unit::any(unbracketed(text)).is_some();
+        let signs = || std::iter::once(delimiter).chain(DELIMITERS);
+        let is_named = |text: &String| Unit::any(unbracketed(text)).is_some();
+        let is_unit = |text: &String| text == "-" || is_named(text);
         let begins_with_times = quantity_of(self.quantity_name(0)) == Some(Quantity::Time);
-        let units = signs.find_map(|sign| {
+        let units = signs().find_map(|sign| {
             let mut fields = split(stated, sign);
             if begins_with_times && fields.len() + 1 == self.columns.len() {
                 fields.insert(0, "-".into());
@@ -90,6 +91,8 @@ impl Table {
         });
         match units {
             Some(units) => self.units = units,
+            // The number of a device is none.
+            None if !signs().any(|sign| split(stated, sign).iter().any(is_named)) => {}
             None => {
                 let statement = format!("the units {}", quote(stated));
                 let columns = self.columns.iter_mut();

@@ -17,6 +17,7 @@ mod golden;
 mod init;
 mod known_parts;
 mod measured_input;
+mod misleading;
 mod models;
 mod oscillator;
 mod predict;
