@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     println!(
         "m(0) = {:.3} kg, y(25) = {:.3} m",
-        nodal.mass[0],
+        nodal.inertias[0][0],
         response.displacement(0)[1999]
     );
     Ok(())

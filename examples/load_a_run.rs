@@ -8,11 +8,8 @@ use std::path::Path;
 /// The ratio J/J0, and the largest displacement (m) of the identified system released at 1 m.
 pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
     let run = Run::open(folder)?;
-    let let_go = State {
-        displacement: 1.0,
-        velocity: 0.0,
-    };
-    let response = run.system.forward(&run.coefficients, let_go, None)?;
+    let let_go = State::one(1.0, 0.0);
+    let response = run.system.forward(&run.coefficients, &let_go, None)?;
     let most = response
         .displacement(0)
         .iter()

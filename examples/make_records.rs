@@ -6,7 +6,7 @@
 use kmcfit::results::write_whole;
 use kmcfit_core::ChannelKind;
 use kmcfit_core::internals::step::{Trajectory, observe};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
     TimePoint,
@@ -49,13 +49,13 @@ impl Run<'_> {
         let grid = Grid::new(0.0, self.time(self.count - 1), nodes).expect("a grid");
         let at_nodes = |f: Function| grid.times().iter().map(|t| f(*t)).collect();
         let nodal = NodalCoefficients {
-            mass: vec![self.mass; nodes],
+            inertias: vec![vec![self.mass; nodes]],
             coefficients: self.terms.iter().map(|(_, p)| at_nodes(*p)).collect(),
         };
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: self.terms.iter().map(|(term, _)| *term).collect(),
+            structure: Structure::one(self.terms.iter().map(|(term, _)| *term).collect()),
         };
         let steps = |f: Function| {
             let step = |i: usize| {
@@ -69,7 +69,7 @@ impl Run<'_> {
             base: self.base.map(steps),
         };
         let response: Trajectory = system
-            .forward(&nodal, self.initial, Some(&excitation))
+            .forward(&nodal, &self.initial, Some(&excitation))
             .expect("a motion");
         let samples = 0..self.count;
         let acceleration = samples.clone().map(|i| {
@@ -107,10 +107,7 @@ impl Noise {
 }
 
 fn state(displacement: f64, velocity: f64) -> State {
-    State {
-        displacement,
-        velocity,
-    }
+    State::one(displacement, velocity)
 }
 
 fn linear<'a>(c: Function<'a>, k: Function<'a>) -> Vec<(Law, Function<'a>)> {
@@ -160,7 +157,7 @@ pub fn hammer(number: u64) -> String {
         terms: linear(&|_| TESTED[1], &|_| TESTED[2]),
         force: None,
         base: None,
-        initial: blows[number as usize - 1],
+        initial: blows[number as usize - 1].clone(),
         rate: 100.0,
         count: 301,
     };

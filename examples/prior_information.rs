@@ -32,7 +32,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
     let fit = problem.fit()?;
     println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
 
-    let mass = &fit.best.evaluation.nodal.mass;
+    let mass = &fit.best.evaluation.nodal.inertias[0];
     let count = mass.len() as f64;
     let truth = (1..=mass.len()).map(|i| 1.0 - 0.5 * i as f64 / count);
     let errors = mass.iter().zip(truth).map(|(m, truth)| (m - truth).abs());

@@ -3,7 +3,7 @@
 
 use kmcfit_core::internals::identifiability::{ScaleFreedom, structural_rank};
 use kmcfit_core::{Builder, CoefficientSpec, Record};
-use kmcfit_core::{Excitation, Grid, Law, Method, NodalCoefficients, State, System};
+use kmcfit_core::{Excitation, Grid, Law, Method, NodalCoefficients, State, Structure, System};
 use std::error::Error;
 
 /// Structural rank of the free record and of the pair, each with `true` if a common factor of all functions is
@@ -14,22 +14,19 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     let nodes = grid.nodes();
     let nodal = NodalCoefficients {
-        mass: vec![1.0; nodes],
+        inertias: vec![vec![1.0; nodes]],
         coefficients: vec![vec![0.1; nodes], vec![4.0; nodes]],
     };
     let times = grid.times();
     let force: Vec<f64> = times.iter().map(|t| (1.7 * t).sin()).collect();
     let excitation = Excitation::force_at_nodes(&force);
-    let plucked = State {
-        displacement: 1.0,
-        velocity: 0.0,
-    };
-    let decay = system.forward(&nodal, plucked, None)?;
-    let shaken = system.forward(&nodal, State::default(), Some(&excitation))?;
+    let plucked = State::one(1.0, 0.0);
+    let decay = system.forward(&nodal, &plucked, None)?;
+    let shaken = system.forward(&nodal, &State::rest(1), Some(&excitation))?;
 
     let free = Record::new("free decay")
         .from_state(1.0, 0.0)

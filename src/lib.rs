@@ -19,6 +19,7 @@
     reason = "an input error ends the program: its size costs nothing, its detail helps"
 )]
 pub mod cli;
+mod clock;
 pub mod config;
 pub mod digest;
 pub mod error;
@@ -28,6 +29,7 @@ pub mod fitting;
 pub mod fleet;
 pub mod formats;
 pub mod guide;
+mod headings;
 mod magnitudes;
 mod memory;
 mod number_format;

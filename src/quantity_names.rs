@@ -7,7 +7,7 @@ const NAMES: [(Quantity, &str, &str); 5] = [
     (
         Quantity::Time,
         "time zeit uhrzeit millis micros elapsed",
-        "t date datum epoch",
+        "t date datum datenum matlab epoch jd mjd julian",
     ),
     (Quantity::Acceleration, "acc beschl", "a ax ay az"),
     (
@@ -81,6 +81,12 @@ fn begun(words: &[String]) -> Option<Quantity> {
 /// ```
 pub fn quantity_of(name: &str) -> Option<Quantity> {
     let words = words(name);
+    // The times of a force.
+    if let [first, _, ..] = words.as_slice()
+        && first == "t"
+    {
+        return Some(Quantity::Time);
+    }
     begun(&words).or_else(|| {
         let first = words.first()?;
         let mut all = NAMES.iter();

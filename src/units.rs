@@ -139,7 +139,7 @@ impl Unit {
         product(text).filter(is_of_quantity)
     }
 
-    fn is_of(&self, kind: Quantity) -> bool {
+    pub(crate) fn is_of(&self, kind: Quantity) -> bool {
         kind.dimensions().contains(&self.powers) || self.powers == VOLT && kind != Quantity::Time
     }
 

@@ -7,7 +7,7 @@ use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::study::multistart::{Multistart, Ranges};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::fmt::Write;
@@ -16,10 +16,9 @@ use std::path::Path;
 /// Length of the paper's record, s.
 const DURATION: f64 = 25.0;
 /// The paper's initial state, m and m/s.
-const INITIAL: State = State {
-    displacement: 3.3,
-    velocity: 1.0,
-};
+fn initial() -> State {
+    State::one(3.3, 1.0)
+}
 /// Starts of a study lie within this factor of the start values: the default of `kmcfit study`.
 const SPREAD: f64 = 3.0;
 
@@ -29,7 +28,7 @@ pub fn paper(nodes: usize) -> Problem {
     let system = System {
         grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
         method: Method::Midpoint,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     let grid = system.grid;
     let weighting = Weighting::Integral {
@@ -43,19 +42,21 @@ pub fn paper(nodes: usize) -> Problem {
         CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
     let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
-    let record = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
+    let record = Experiment::free("free decay", initial(), nodes).with_channel(channel);
     Problem::new(system, functions, vec![record]).unwrap()
 }
 
 fn paper_readings(system: &System) -> Vec<f64> {
     let nodes = system.grid.nodes();
     let truth = NodalCoefficients {
-        mass: (1..=nodes)
-            .map(|i| 1.0 - 0.5 * i as f64 / nodes as f64)
-            .collect(),
+        inertias: vec![
+            (1..=nodes)
+                .map(|i| 1.0 - 0.5 * i as f64 / nodes as f64)
+                .collect(),
+        ],
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
-    let response = system.forward(&truth, INITIAL, None);
+    let response = system.forward(&truth, &initial(), None);
     response.expect("a motion").displacement(0).to_vec()
 }
 
@@ -132,17 +133,14 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness, Law::CubicStiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness, Law::CubicStiffness]),
     };
-    let rest = State {
-        displacement: 0.0,
-        velocity: 0.0,
-    };
+    let rest = State::one(0.0, 0.0);
     let truth = NodalCoefficients {
-        mass: vec![1.0; samples],
+        inertias: vec![vec![1.0; samples]],
         coefficients: [1.2, 20.0, 15.0].map(|p| vec![p; samples]).to_vec(),
     };
-    let response = system.forward(&truth, rest, Some(&excitation));
+    let response = system.forward(&truth, &rest, Some(&excitation));
     let response = response.expect("a motion");
     let acceleration: Vec<f64> = (0..samples)
         .map(|i| {

@@ -101,10 +101,7 @@ pub fn simulate(
     guarded(py, || {
         let kinds = kinds(&channels)?;
         let run = Run::open(&folder)?;
-        let state = State {
-            displacement: initial.0,
-            velocity: initial.1,
-        };
+        let state = State::one(initial.0, initial.1);
         if force.is_none() && base.is_none() {
             return free(&run, state, &kinds);
         }

@@ -9,7 +9,7 @@ use crate::report::compare::{Comparison, Measures};
 use crate::report::document::{Verdict, level_in_words};
 use crate::report::{CsvTable, Run};
 use crate::results::OutputFolder;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -37,19 +37,16 @@ fn tables() -> Result<[String; 2], CommandError> {
     let mass = (0..NODES).map(|i| 1.0 - 0.5 * (i + 1) as f64 / NODES as f64);
     let (damping, stiffness) = (vec![0.0; NODES], vec![1.0; NODES]);
     let coefficients = NodalCoefficients {
-        mass: mass.collect(),
+        inertias: vec![mass.collect()],
         coefficients: vec![damping.clone(), stiffness.clone()],
     };
     let system = System {
         grid,
         method: Method::Midpoint,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
-    let initial = State {
-        displacement: 3.3,
-        velocity: 1.0,
-    };
-    let response = system.forward(&coefficients, initial, None);
+    let initial = State::one(3.3, 1.0);
+    let response = system.forward(&coefficients, &initial, None);
     let response =
         response.map_err(|error| CommandError::Numerical(format!("no response: {error}")))?;
     let record = CsvTable::new()
@@ -57,7 +54,7 @@ fn tables() -> Result<[String; 2], CommandError> {
         .column("y_m", response.displacement(0).to_vec());
     let truth = CsvTable::new()
         .column("t_s", grid.times())
-        .column("mass_kg", coefficients.mass)
+        .column("mass_kg", coefficients.inertias[0].clone())
         .column("damping_N_s_per_m", damping)
         .column("stiffness_N_per_m", stiffness);
     Ok([record.to_csv(), truth.to_csv()])
@@ -166,10 +163,10 @@ type Quantity = (
 const QUANTITIES: [Quantity; 8] = [
     ("fit of the displacement (%)", "100", |_, m| m.worst_fit),
     ("mass at 0 s (kg)", "1", |run, _| {
-        run.coefficients.mass.first().copied()
+        run.coefficients.inertias[0].first().copied()
     }),
     ("mass at 25 s (kg)", "0.5", |run, _| {
-        run.coefficients.mass.last().copied()
+        run.coefficients.inertias[0].last().copied()
     }),
     ("smallest damping (N s/m)", "0", |run, _| {
         run.coefficients.coefficients[0]

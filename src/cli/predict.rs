@@ -134,10 +134,7 @@ fn forced(
     let (force, base) = (arguments.force.as_deref(), arguments.base.as_deref());
     let record = NewRecord::read(force, base, &run.own_model()?)?;
     if states.is_empty() {
-        states.push(State {
-            displacement: 0.0,
-            velocity: 0.0,
-        });
+        states.push(State::one(0.0, 0.0));
     }
     let wanted = |kind: &ChannelKind| arguments.channel.iter().any(|name| name == kind.name());
     let kinds: Vec<ChannelKind> = ChannelKind::ALL.into_iter().filter(wanted).collect();
@@ -169,10 +166,9 @@ fn state(text: &str) -> Result<State, InputError> {
         .filter(|x: &f64| x.is_finite())
         .collect();
     match numbers.as_slice() {
-        &[displacement, velocity] if text.split(',').count() == 2 => Ok(State {
-            displacement,
-            velocity,
-        }),
+        &[displacement, velocity] if text.split(',').count() == 2 => {
+            Ok(State::one(displacement, velocity))
+        }
         _ => Err(InputError::argument("--initial", "invalid initial state")
             .found(format!("`{text}`"))
             .expected("two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1")),

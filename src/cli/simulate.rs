@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         check_place(out, &file)?;
     }
     let experiment = chosen(arguments, &problem.experiments)?;
-    if experiment.initial_parameters != [None; 2] {
+    if !experiment.begins_known() {
         return Err(file
             .error_at(
                 "experiments",
@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .system
         .forward(
             &coefficients,
-            experiment.initial,
+            &experiment.initial,
             experiment.excitation.as_ref(),
         )
         .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;

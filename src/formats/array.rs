@@ -16,7 +16,7 @@ pub(super) struct Array<'a> {
 
 impl Array<'_> {
     /// Adds one channel for each column or, in an array with more columns than rows, for each row: the longer dimension is time.
-    /// Several are named `name.1`, `name.2`, ...; a single unit holds for all of them.
+    /// Several are named `name.1`, `name.2`, ...
     ///
     /// # Errors
     /// When they exceed the budget.
@@ -24,7 +24,6 @@ impl Array<'_> {
         &self,
         channels: &mut Channels,
         name: &str,
-        units: &[String],
         budget: &mut Budget,
     ) -> Result<(), InputError> {
         let in_rows = self.columns > self.rows;
@@ -49,12 +48,7 @@ impl Array<'_> {
             budget.name(&name)?;
             let mut values = budget.list(samples)?;
             values.extend((0..samples).map(|k| (self.value)(i * first + k * step)));
-            let unit = match units {
-                [one] => Some(one),
-                several if several.len() == count => several.get(i),
-                _ => None,
-            };
-            channels.push(&name, unit.cloned(), None, values);
+            channels.push(&name, None, None, values);
         }
         Ok(())
     }

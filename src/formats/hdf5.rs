@@ -11,9 +11,8 @@ use hdf5_pure::{AttrValue, Dataset, File, Group, Layout, Object};
 
 use super::array::Array;
 use super::budget::{Budget, damaged};
-use super::hdf5_fields::{add_attributes, fields, numbers};
+use super::hdf5_fields::{fields, is_text, numbers, statements};
 use super::hdf5_guards::{Missing, remove_soft_links};
-use super::stated::{self, Meaning, Stated};
 use super::{Channels, Format, mat_class, refused};
 use crate::error::InputError;
 use crate::text_io::quote;
@@ -22,6 +21,8 @@ use crate::text_io::quote;
 pub(super) const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Value of floating-point samples of netCDF that were never written.
 const FILL: f64 = 9.969_209_968_386_869e36;
+/// Longest text that states something, bytes.
+const LONGEST: u64 = 1000;
 /// Deepest nesting of groups and cells: hard links can form circles.
 const DEEPEST: usize = 32;
 /// Beginnings of groups of MATLAB with the targets of references and the data of objects, and of PyTables with the orders of columns.
@@ -47,7 +48,6 @@ pub(super) fn read<'a>(
         format,
         budget,
         channels: Channels::default(),
-        stated: Vec::new(),
     };
     reader.members(&file.root(), "", 0)?;
     Ok(reader.channels)
@@ -58,8 +58,6 @@ struct Reader<'a, 'b> {
     format: Format,
     budget: &'b mut Budget<'a>,
     channels: Channels,
-    /// What the attributes of the groups state, outermost first.
-    stated: Vec<Stated>,
 }
 
 /// Why a data set is not read.
@@ -102,8 +100,9 @@ impl Reader<'_, '_> {
         if depth > DEEPEST {
             return Err(refused::nested(self.path, name, DEEPEST));
         }
-        let mut stated = self.stated.last().cloned().unwrap_or_default();
-        add_attributes(&mut stated, &group.attrs().unwrap_or_default());
+        for (own, values) in statements(&group.attrs().unwrap_or_default()) {
+            self.channels.state_group(name, own, values);
+        }
         let members = match listed(group) {
             Ok(members) => members,
             Err(error) => {
@@ -111,7 +110,6 @@ impl Reader<'_, '_> {
                 return self.report(name, Unread::from(error));
             }
         };
-        self.stated.push(stated);
         for (own, member) in members {
             if !INTERNAL.iter().any(|internal| own.starts_with(internal)) {
                 let path = joined(name, &own);
@@ -119,7 +117,6 @@ impl Reader<'_, '_> {
                 self.object(&member, &path, depth)?;
             }
         }
-        self.stated.pop();
         Ok(())
     }
 
@@ -138,7 +135,12 @@ impl Reader<'_, '_> {
             is_empty: attributes.contains_key("MATLAB_empty"),
         };
         match class.name {
-            Some("char") => return self.old_class(name, mat_class::CHAR),
+            Some("char") => {
+                if let Object::Dataset(set) = object {
+                    self.state_text(set, name);
+                }
+                return self.old_class(name, mat_class::CHAR);
+            }
             Some("function_handle") => return self.old_class(name, mat_class::FUNCTION),
             Some(class) if !(NUMERIC.contains(&class) || ["struct", "cell"].contains(&class)) => {
                 let hint = mat_class::export(self.path, name, class);
@@ -159,6 +161,27 @@ impl Reader<'_, '_> {
             },
             _ => Ok(()),
         }
+    }
+
+    /// States a short text: a data set of texts, or of the letters of MATLAB.
+    fn state_text(&mut self, set: &Dataset, name: &str) {
+        let count = set.shape().map_or(u64::MAX, |shape| shape.iter().product());
+        let size = set.element_size().unwrap_or(u64::MAX);
+        if count.saturating_mul(size) > LONGEST {
+            return;
+        }
+        let texts = match set.datatype() {
+            Ok(kind) if is_text(&kind) => set.read_string().unwrap_or_default(),
+            _ => {
+                let letters = set.read_raw().unwrap_or_default();
+                let pairs = letters
+                    .chunks_exact(2)
+                    .map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
+                vec![String::from_utf16_lossy(&pairs.collect::<Vec<_>>())]
+            }
+        };
+        let (group, own) = name.rsplit_once('.').unwrap_or(("", name));
+        self.channels.state_group(group, own, texts);
     }
 
     fn old_class(&mut self, name: &str, class: u32) -> Result<(), InputError> {
@@ -194,6 +217,9 @@ impl Reader<'_, '_> {
         depth: usize,
     ) -> Result<(), Unread> {
         let kind = set.datatype()?;
+        if is_text(&kind) {
+            self.state_text(set, name);
+        }
         let shape = set.shape()?;
         let fields = fields(&kind)?;
         if class.is_empty || shape.contains(&0) {
@@ -234,42 +260,19 @@ impl Reader<'_, '_> {
         for key in ["_FillValue", "missing_value"] {
             fill.extend(attributes.get(key).map(numbers).unwrap_or_default());
         }
-        let of = |meaning: Meaning| {
-            attributes
-                .iter()
-                .filter(move |(key, _)| stated::meaning(key) == Some(meaning))
-        };
-        let units = of(Meaning::Unit).find_map(|(_, value)| value.as_strings());
-        // One for all columns, or one for each.
-        let scale = |meaning: Meaning, neutral: f64| {
-            let found = of(meaning)
-                .map(|(_, value)| numbers(value))
-                .find(|found| !found.is_empty());
-            move |column: usize| match found.as_deref() {
-                Some([one]) => *one,
-                Some(several) => several.get(column).copied().unwrap_or(f64::NAN),
-                None => neutral,
-            }
-        };
-        let (factor, offset) = (scale(Meaning::Factor, 1.0), scale(Meaning::Offset, 0.0));
-        let mut stated = self.stated.last().cloned().unwrap_or_default();
-        add_attributes(&mut stated, attributes);
-        let units = units.unwrap_or_default();
-        let of_fields = units.len() == fields.len();
-        if let (Some((Some(_), ..)), false, [unit, ..]) = (fields.first(), of_fields, units) {
-            stated.unapplied.push(format!("the unit {unit} of a table"));
-        }
-        for (place, (field, number, at)) in fields.iter().enumerate() {
+        let unsigned = attributes.get("_Unsigned").and_then(AttrValue::as_str) == Some("true");
+        let before = self.channels.channels.len();
+        for (field, number, at) in &fields {
             let value = |i: usize| {
                 let own = bytes.get(i * size + at..).unwrap_or_default();
                 let value = number.value(own);
-                let column = i % columns;
-                if fill.contains(&value) || missing.contains([i / columns, column]) {
+                if fill.contains(&value) || missing.contains([i / columns, i % columns]) {
                     return f64::NAN;
                 }
-                // Without a scale no digit changes.
-                let column = if rows == 1 { 0 } else { column };
-                factor(column) * value + offset(column)
+                match unsigned && value < 0.0 {
+                    true => value + 256f64.powi(number.size as i32),
+                    false => value,
+                }
             };
             // MATLAB states columns before rows: these are the adjacent elements.
             let is_matlab = class.name.is_some();
@@ -279,22 +282,18 @@ impl Reader<'_, '_> {
                 column_major: is_matlab,
                 value: &value,
             };
-            let (name, units) = match field {
-                Some(field) if of_fields => (joined(name, field), &units[place..=place]),
-                Some(field) => (joined(name, field), &[][..]),
-                None => (name.to_owned(), units),
+            let name = match field {
+                Some(field) => joined(name, field),
+                None => name.to_owned(),
             };
-            let before = self.channels.channels.len();
-            array.add_to(&mut self.channels, &name, units, self.budget)?;
-            for channel in self
-                .channels
-                .channels
-                .iter_mut()
-                .skip(before)
-                .filter(|c| c.values.len() > 1)
-            {
-                channel.sampling = stated.sampling();
-                channel.unapplied.clone_from(&stated.unapplied);
+            array.add_to(&mut self.channels, &name, self.budget)?;
+        }
+        // One value for the fields of a table is as one of a group.
+        let is_table = matches!(&*fields, [(Some(_), ..), ..]);
+        for (own, values) in statements(attributes) {
+            match is_table && values.len() == 1 && !own.starts_with("FIELD_") {
+                true => self.channels.state_group(name, own, values),
+                false => self.channels.state(before, own, values),
             }
         }
         Ok(())

@@ -4,10 +4,20 @@ use hdf5_pure::{AttrValue, Datatype};
 
 use super::hdf5::{Attributes, Unread, content};
 use super::hdf5_number::Number;
-use super::stated::Stated;
 
 /// Most numbers of a field.
 const WIDEST: u32 = 1000;
+
+pub(super) fn is_text(kind: &Datatype) -> bool {
+    matches!(
+        kind,
+        Datatype::String { .. }
+            | Datatype::VariableLength {
+                is_string: true,
+                ..
+            }
+    )
+}
 
 /// Name, form and place of the numbers of an element, without a name for one that is a number itself; `None` for references.
 #[expect(clippy::type_complexity, reason = "named once")]
@@ -17,10 +27,7 @@ pub(super) fn fields(
     let members = match kind {
         Datatype::Reference { .. } => return Ok(None),
         Datatype::Compound { members, .. } => members,
-        Datatype::String { .. }
-        | Datatype::VariableLength {
-            is_string: true, ..
-        } => return Err(content("texts", None)),
+        kind if is_text(kind) => return Err(content("texts", None)),
         kind => {
             let number = Number::of(kind);
             let number =
@@ -78,15 +85,15 @@ pub(super) fn numbers(value: &AttrValue) -> Vec<f64> {
         .unwrap_or_default()
 }
 
-pub(super) fn add_attributes(stated: &mut Stated, attributes: &Attributes) {
+/// What attributes state, in the order of their names.
+pub(super) fn statements(attributes: &Attributes) -> Vec<(&String, Vec<String>)> {
     let mut all: Vec<(&String, &AttrValue)> = attributes.iter().collect();
     all.sort_by_key(|(name, _)| *name);
-    for (name, value) in all {
-        let text = match (value.as_str(), numbers(value).as_slice()) {
-            (Some(text), _) => text.to_owned(),
-            (None, [one]) => one.to_string(),
-            (None, several) => format!("{several:?}"),
-        };
-        stated.add(name, &text);
-    }
+    let text = |value: &AttrValue| match value.as_strings() {
+        Some(texts) => texts.to_vec(),
+        None => numbers(value).iter().map(ToString::to_string).collect(),
+    };
+    all.into_iter()
+        .map(|(name, value)| (name, text(value)))
+        .collect()
 }

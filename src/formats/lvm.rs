@@ -6,8 +6,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::Channels;
 use super::budget::Budget;
-use super::{Channels, Sampling};
+use super::clocks::sampling_of;
 use crate::error::InputError;
 use crate::text_io::quote;
 
@@ -120,11 +121,7 @@ fn segment(
     channels: &mut Channels,
     budget: &mut Budget,
 ) -> Result<(), InputError> {
-    let value = |key: &str, i: usize| {
-        Some(stated.get(key)?.get(i)?.as_str()).filter(|text| !text.is_empty())
-    };
-    let number = |key: &str, i: usize| value(key, i)?.replace(',', ".").parse::<f64>().ok();
-    let mut channel = 0;
+    let (mut channel, mut own) = (0, None);
     for (i, mut values) in columns.into_iter().enumerate() {
         let last = values.iter().rposition(|x| !x.is_nan());
         values.truncate(last.map_or(0, |last| last + 1));
@@ -137,23 +134,42 @@ fn segment(
         }
         budget.grow(&mut Vec::new(), values.len())?;
         if is_time && times != Times::None {
-            let unit = value("X_Unit_Label", channel).unwrap_or("s").to_owned();
-            let is_known = |c: &super::Channel| c.name.starts_with("time") && c.values == values;
-            if !channels.channels.iter().any(is_known) {
-                channels.push("time", Some(unit), None, values);
+            // One rate for each channel where they have times of their own.
+            let unit = stated
+                .get("X_Unit_Label")
+                .and_then(|units| units.get(channel));
+            let unit = unit
+                .filter(|unit| !unit.is_empty())
+                .map_or("s", String::as_str);
+            own = (times == Times::Multi)
+                .then(|| sampling_of(&values, unit))
+                .flatten();
+            if own.is_none() {
+                channels.push("time", Some(unit.to_owned()), None, values);
             }
             continue;
         }
         let name = names.get(i).filter(|name| !name.is_empty());
         let name = name.map_or_else(|| format!("channel {}", channel + 1), String::clone);
         budget.name(&name)?;
-        let sampling = match times {
-            Times::None => number("Delta_X", channel)
-                .and_then(|step| Sampling::interval(number("X0", channel).unwrap_or(0.0), step)),
-            _ => None,
-        };
-        let unit = value("Y_Unit_Label", channel).map(str::to_owned);
-        channels.push(&name, unit, sampling, values);
+        let from = channels.channels.len();
+        channels.push(&name, None, own, values);
+        for (key, of_channels) in stated
+            .iter()
+            .filter(|(key, _)| times == Times::None || key.as_str() == "Y_Unit_Label")
+        {
+            // The times of day of the first samples.
+            let key = if key == "Time" { "start_time" } else { key };
+            let text = of_channels.get(channel).filter(|text| !text.is_empty());
+            let text = text.map(|text| {
+                if key.starts_with("start") {
+                    text.clone()
+                } else {
+                    text.replace(',', ".")
+                }
+            });
+            channels.state(from, key, text.into_iter().collect());
+        }
         channel += 1;
     }
     Ok(())

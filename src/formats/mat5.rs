@@ -94,6 +94,24 @@ fn text_of(bytes: &[u8]) -> String {
     String::from_utf8_lossy(text.unwrap_or_default()).into_owned()
 }
 
+/// Longest text that states something, characters.
+const LONGEST: usize = 200;
+
+/// The letters of an array of characters: UTF-8, or numbers of 16 bits.
+fn characters(kind: u32, bytes: Bytes) -> String {
+    match number_type(kind) {
+        Some(kind) => (0..(bytes.left() / kind.size()).min(LONGEST))
+            .filter_map(|i| char::from_u32(kind.value_at(bytes.rest(), bytes.order, i) as u32))
+            .collect(),
+        None if kind == 17 => (0..(bytes.left() / 2).min(LONGEST))
+            .filter_map(|i| {
+                char::from_u32(NumberType::U16.value_at(bytes.rest(), bytes.order, i) as u32)
+            })
+            .collect(),
+        None => text_of(bytes.rest()).chars().take(LONGEST).collect(),
+    }
+}
+
 fn number_type(kind: u32) -> Option<NumberType> {
     Some(match kind {
         1 => NumberType::I8,
@@ -162,6 +180,11 @@ impl Reader<'_, '_> {
             }
             class if NUMERIC.contains(&class) => self.numbers(bytes, &name, &dims),
             class => {
+                if let (mat_class::CHAR, Ok((kind, letters))) = (class, element(bytes, &what)) {
+                    let text = characters(kind, letters);
+                    let (group, own) = name.rsplit_once('.').unwrap_or(("", &name));
+                    self.channels.state_group(group, own, vec![text]);
+                }
                 let (content, hint) = mat_class::old(class);
                 self.channels.refuse(&name, content, hint);
                 Ok(())
@@ -196,7 +219,7 @@ impl Reader<'_, '_> {
             column_major: true,
             value: &|i| kind.value_at(data.rest(), data.order, i),
         };
-        array.add_to(&mut self.channels, name, &[], self.budget)
+        array.add_to(&mut self.channels, name, self.budget)
     }
 
     /// Elements of a cell or of a struct: `name.1`, `name.2`, ...

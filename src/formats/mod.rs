@@ -6,6 +6,7 @@
 mod array;
 mod budget;
 mod bytes;
+mod clocks;
 mod hdf5;
 mod hdf5_fields;
 mod hdf5_guards;
@@ -13,6 +14,7 @@ mod hdf5_number;
 mod lvm;
 mod mat5;
 mod mat_class;
+mod names;
 mod npy;
 mod number;
 mod recognise;
@@ -28,12 +30,15 @@ mod uff_header;
 mod wav;
 mod zip;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use budget::Budget;
+pub(crate) use clocks::{align, own_times};
+pub(crate) use names::{Meaning, letters, meaning};
 pub use recognise::{DATA_EXTENSIONS, Format, has_data_extension, recognise};
 pub use sampling::Sampling;
-pub(crate) use stated::step_of_line;
+pub(crate) use stated::{Fact, Subject};
 pub(crate) use zip::unpacked;
 
 use crate::error::InputError;
@@ -55,6 +60,8 @@ pub struct Channel {
     pub stated_step: Option<f64>,
     /// Later than the sampling by this fraction of a step, s.
     pub late: f64,
+    /// What the file states of the samples.
+    pub(crate) stated: Vec<Fact>,
 }
 
 /// A variable or channel that holds no samples in time, and the reason.
@@ -77,6 +84,8 @@ pub struct Channels {
     pub unusable: Vec<Unusable>,
     /// Treatment of the samples, a clause each.
     pub notes: Vec<String>,
+    /// What the file states of the channels of a group, by its path.
+    groups: BTreeMap<String, Vec<Fact>>,
 }
 
 impl Channels {
@@ -94,13 +103,6 @@ impl Channels {
             values,
             ..Channel::default()
         });
-    }
-
-    /// Adds scales that are not applied to the last channel.
-    fn leave_unapplied(&mut self, stated: &[String]) {
-        if let Some(last) = self.channels.last_mut() {
-            last.unapplied.extend_from_slice(stated);
-        }
     }
 
     fn refuse(&mut self, name: &str, content: impl Into<String>, hint: Option<&str>) {
@@ -131,10 +133,7 @@ pub fn read(path: &Path, bytes: &[u8], format: Format) -> Result<Channels, Input
         Format::Series => series::read(path, bytes, &mut budget),
         other => Err(refused::whole(path, other)),
     }?;
-    let note = stated::times_of_numbers(&mut channels.channels);
-    channels.notes.extend(note);
-    let note = stated::align(&mut channels.channels);
-    channels.notes.extend(note);
+    channels.apply_statements(matches!(format, Format::Mat73 | Format::Hdf5));
     rename_repeated(&mut channels.channels);
     if channels.channels.is_empty() {
         return Err(refused::nothing(path, format, &channels.unusable));
@@ -144,7 +143,7 @@ pub fn read(path: &Path, bytes: &[u8], format: Format) -> Result<Channels, Input
 
 /// Makes names unique: the second `force` becomes `force.2`.
 fn rename_repeated(channels: &mut [Channel]) {
-    let mut counts = std::collections::BTreeMap::<String, usize>::new();
+    let mut counts = BTreeMap::<String, usize>::new();
     let mut taken: std::collections::BTreeSet<String> =
         channels.iter().map(|c| c.name.clone()).collect();
     for channel in channels {

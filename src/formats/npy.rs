@@ -81,15 +81,47 @@ pub(super) fn add(
                     column_major: header.fortran_order,
                     value: &|i| kind.value_at(data, order, i),
                 };
-                array.add_to(channels, name, &[], budget)
+                array.add_to(channels, name, budget)
             }
             (None, Err((content, hint))) => {
+                channels.state_group("", name, texts(&descr, bytes.rest(), count));
                 channels.refuse(name, content, hint);
                 Ok(())
             }
         },
         Descr::Fields(fields) => structured(name, &fields, bytes, count, budget, channels),
     }
+}
+
+/// Most texts of an array that states something, and the most letters of one.
+const TEXTS: u64 = 1000;
+
+/// The texts of an array of the type `<U5` or `|S5`.
+fn texts(descr: &str, data: &[u8], count: u64) -> Vec<String> {
+    let order = if descr.starts_with('>') {
+        ByteOrder::Big
+    } else {
+        ByteOrder::Little
+    };
+    let kind = descr.trim_start_matches(['<', '>', '=', '|']);
+    let letter = match kind.get(..1) {
+        Some("U") => NumberType::U32,
+        Some("S") => NumberType::U8,
+        _ => return Vec::new(),
+    };
+    let length = kind[1..].parse::<u64>().unwrap_or(0).min(TEXTS) as usize * letter.size();
+    let text = |bytes: &[u8]| -> String {
+        let letters =
+            (0..bytes.len() / letter.size()).map(|i| letter.value_at(bytes, order, i) as u32);
+        letters
+            .take_while(|letter| *letter > 0)
+            .filter_map(char::from_u32)
+            .collect()
+    };
+    data.chunks_exact(length.max(1))
+        .take(count.min(TEXTS) as usize)
+        .map(text)
+        .collect()
 }
 
 /// A header, as NumPy writes it.

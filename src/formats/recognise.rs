@@ -33,6 +33,8 @@ pub enum Format {
     TdmsIndex,
     /// HDF5.
     Hdf5,
+    /// NetCDF before version 4; refused.
+    NetCdf3,
     /// Apache Parquet; refused.
     Parquet,
     /// Compressed by gzip; refused inside another one.
@@ -58,6 +60,7 @@ impl fmt::Display for Format {
             Self::Series => "text with one series in rows",
             Self::TdmsIndex => "index of a TDMS file",
             Self::Hdf5 => "HDF5 file",
+            Self::NetCdf3 => "netCDF file of version 3",
             Self::Parquet => "Parquet file",
             Self::Gzip => "file compressed by gzip",
             Self::Pickle => "pickle of Python",
@@ -85,7 +88,7 @@ const EXTENSIONS: [(&str, &[Format]); 11] = [
         &[Format::Mat5, Format::Mat4, Format::Mat73, Format::Hdf5],
     ),
     ("h5", &[Format::Hdf5, Format::Mat73]),
-    ("nc", &[Format::Hdf5]),
+    ("nc", &[Format::Hdf5, Format::NetCdf3]),
     ("hdf5", &[Format::Hdf5, Format::Mat73]),
     ("tdms", &[Format::Tdms]),
     ("parquet", &[Format::Parquet]),
@@ -159,7 +162,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 }
 
 fn by_content(bytes: &[u8]) -> Option<Format> {
-    let magic: [(&[u8], Format); 14] = [
+    let magic: [(&[u8], Format); 17] = [
         (lvm::MAGIC, Format::Lvm),
         (npy::MAGIC, Format::Npy),
         (b"PK\x03\x04", Format::Npz),
@@ -169,6 +172,9 @@ fn by_content(bytes: &[u8]) -> Option<Format> {
         (b"MATLAB 7.3 MAT-file", Format::Mat73),
         (b"MATLAB 5.0 MAT-file", Format::Mat5),
         (hdf5::SIGNATURE, Format::Hdf5),
+        (b"CDF\x01", Format::NetCdf3),
+        (b"CDF\x02", Format::NetCdf3),
+        (b"CDF\x05", Format::NetCdf3),
         (b"PAR1", Format::Parquet),
         (b"\x1f\x8b\x08", Format::Gzip),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", Format::Workbook),

@@ -15,6 +15,9 @@ pub(super) fn whole(path: &Path, format: Format) -> InputError {
         Format::Parquet => {
             "export it as CSV from pandas: `pandas.read_parquet(file).to_csv('record.csv', index=False)`"
         }
+        Format::NetCdf3 => {
+            "write it as netCDF 4: `nccopy -k nc4 record.nc record4.nc`, or in Python `xarray.open_dataset(file).to_netcdf('record4.nc')`"
+        }
         Format::Mat4 => "save it with `save('record.mat', '-v7')` in MATLAB",
         Format::TdmsIndex => "read the file with the ending .tdms beside it",
         Format::Gzip => "decompress it twice: `gunzip FILE`",

@@ -62,8 +62,24 @@ fn head(line: &str) -> Option<Head> {
 /// The numbers of a line: parted by blanks or, where they touch, in columns of the `width` that a Fortran format states.
 fn numbers(line: &str, width: Option<usize>) -> Option<Vec<f64>> {
     let number = |text: &str| text.trim().replace(['D', 'd'], "E").parse::<f64>().ok();
-    let parted: Option<Vec<f64>> = line.split_whitespace().map(number).collect();
-    parted.or_else(|| {
+    let parted = |line: &str| {
+        line.split_whitespace()
+            .map(number)
+            .collect::<Option<Vec<f64>>>()
+    };
+    // Numbers can touch at their signs.
+    let at_signs = || {
+        let mut text = String::new();
+        for c in line.chars() {
+            let is_sign = matches!(c, '-' | '+');
+            if is_sign && text.ends_with(|before: char| before.is_ascii_digit() || before == '.') {
+                text.push(' ');
+            }
+            text.push(c);
+        }
+        parted(&text)
+    };
+    parted(line).or_else(at_signs).or_else(|| {
         let bytes = line
             .trim_end()
             .as_bytes()
@@ -86,6 +102,18 @@ fn width(line: &str) -> Option<usize> {
         .ok()
 }
 
+/// What the lines of a header state: the last one, or all together.
+fn stated(lines: &[&str]) -> Option<Head> {
+    lines
+        .last()
+        .and_then(|line| head(line))
+        .or_else(|| head(&lines.join(" ")))
+}
+
+fn width_of(lines: &[&str]) -> Option<usize> {
+    lines.iter().rev().find_map(|line| width(line))
+}
+
 /// True for a text with such a header whose series has another number of rows.
 pub(super) fn begins_so(bytes: &[u8]) -> bool {
     let beginning = bytes.get(..bytes.len().min(BEGINNING)).unwrap_or_default();
@@ -96,17 +124,27 @@ pub(super) fn begins_so(bytes: &[u8]) -> bool {
     if text.starts_with("Origin Time") && text.contains(KNET[0]) {
         return true;
     }
-    let Some(found) = text.lines().position(|line| head(line).is_some()) else {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut begin = 0;
+    // A header of numbers can stand before that of the series.
+    let found = (1..lines.len()).find_map(|i| {
+        let header = lines.get(begin..i)?;
+        let width = width_of(header);
+        let is_row = |line: &str| numbers(line, width).is_some_and(|row| !row.is_empty());
+        if !is_row(lines[i]) || is_row(lines[i - 1]) {
+            return None;
+        }
+        let found = stated(header).and_then(|head| Some((i, head.count?, width)));
+        begin = i;
+        found
+    });
+    let Some((first, count, width)) = found else {
         return false;
     };
     // A table has as many rows as samples.
     let text = String::from_utf8_lossy(bytes);
-    let mut lines = text.lines().skip(found);
-    let line = lines.next().unwrap_or_default();
-    let count = head(line).and_then(|head| head.count).unwrap_or(0);
-    let rows = lines
-        .map_while(|line| numbers(line, width(line)))
-        .filter(|row| !row.is_empty());
+    let rows = text.lines().skip(first);
+    let rows = rows.map_while(|line| numbers(line, width).filter(|row| !row.is_empty()));
     let (mut total, mut last) = (0, 0);
     for row in rows {
         last = row.len();
@@ -117,7 +155,7 @@ pub(super) fn begins_so(bytes: &[u8]) -> bool {
 
 pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Channels, InputError> {
     let text = String::from_utf8_lossy(bytes);
-    let mut lines = text.lines().enumerate();
+    let mut lines = text.lines().enumerate().peekable();
     let mut channels = Channels::default();
     let mut texts: Vec<&str> = Vec::new();
     let (mut rate, mut scale) = (None, None);
@@ -136,11 +174,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
             count: None,
             step: 1.0 / rate,
         });
-        let Some(head) = head(line).or(of_knet) else {
+        let width = width_of(&texts);
+        let is_row = |line: &str| numbers(line, width).is_some_and(|row| !row.is_empty());
+        let is_last = lines.peek().is_some_and(|(_, next)| is_row(next)) && !is_row(line);
+        let Some(head) = stated(&texts).filter(|_| is_last).or(of_knet) else {
             continue;
         };
         let mut values = budget.list(head.count.unwrap_or(0))?;
-        let width = width(line);
         while head.count.is_none_or(|count| values.len() < count) {
             let Some((i, line)) = lines.next() else { break };
             let row = numbers(line, width).ok_or_else(|| {
@@ -205,7 +245,7 @@ fn unit_of(line: &str) -> Option<String> {
             .split([',', ';', '('])
             .next()?
             .trim()
-            .trim_end_matches('.');
+            .trim_end_matches(['.', ')']);
         Unit::any(text).map(|_| text.to_owned())
     };
     let of_list = || {

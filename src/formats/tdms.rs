@@ -9,8 +9,9 @@ use std::path::Path;
 use super::budget::Budget;
 use super::bytes::Bytes;
 use super::number::ByteOrder;
-use super::stated::{Meaning, Stated, meaning};
-use super::tdms_meta::{Properties, Property, RawData, RawIndex, SampleType, dotted, object};
+use super::tdms_meta::{
+    Properties, Property, RawData, RawIndex, SampleType, dotted, object, statements,
+};
 use super::{Channels, tdms_scales as scales};
 use crate::error::InputError;
 
@@ -70,7 +71,14 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
     }
     let starts = tracks.all.iter().filter_map(Track::start);
     let first = starts.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let first = first.unwrap_or_default();
     let none = Properties::new();
+    for (path, properties) in &tracks.outer {
+        let (group, _) = dotted(path).unwrap_or_default();
+        for (name, value) in statements(properties, first) {
+            channels.state_group(&group, name, value);
+        }
+    }
     for track in tracks.all {
         let outer = |path: &str| tracks.outer.get(path).unwrap_or(&none);
         let outer = [outer(&track.group), outer("/")];
@@ -155,7 +163,7 @@ impl Tracks {
             if matches!(object.raw, RawData::Daqmx) {
                 return Err(daqmx(path));
             }
-            let Some(name) = dotted(&object.path) else {
+            let Some((name, true)) = dotted(&object.path) else {
                 let outer = self.outer.entry(object.path).or_default();
                 outer.extend(object.properties);
                 continue;
@@ -312,14 +320,9 @@ impl Track {
         }
     }
 
-    /// Adds the channel to those of the file, with its scales applied: its own, else those of its group, else those of the file. Its times
-    /// begin at the earliest start of a channel, `first`.
-    fn finish(
-        mut self,
-        outer: [&Properties; 2],
-        first: Option<(i64, f64)>,
-        channels: &mut Channels,
-    ) {
+    /// Adds the channel to those of the file, with its scales applied: its own, else those of its group, else those of the file. `first` is
+    /// the earliest start of a channel.
+    fn finish(mut self, outer: [&Properties; 2], first: (i64, f64), channels: &mut Channels) {
         if let Some(other) = self.other {
             return channels.refuse(&self.name, other, None);
         }
@@ -328,42 +331,21 @@ impl Track {
         }
         let [group, file] = outer;
         let mut of = [&self.properties, group, file].into_iter();
+        let mut unknown = None;
         if let Some(scaled) = of.find(|properties| scales::count(properties) > 0) {
             match scales::of(scaled) {
                 Ok(scales) => scales::apply(&scales, &mut self.values),
-                Err(content) => {
-                    let hint = "save the scaled samples: scales of type Linear and Polynomial are supported";
-                    return channels.refuse(&self.name, content, Some(hint));
-                }
+                Err(content) => unknown = Some(content),
             }
         }
-        let mut stated = Stated::default();
-        for (name, value) in file.iter().chain(group).chain(&self.properties) {
-            let value = match value {
-                Property::Number(number) => number.to_string(),
-                Property::Text(text) => text.clone(),
-                Property::Time(..) | Property::Other => continue,
-            };
-            // Those of netCDF are none of TDMS.
-            if let Some(Meaning::Factor | Meaning::Offset) = meaning(name) {
-                stated.unapplied.push(format!("{name} = {value}"));
-            }
-            stated.add(name, &value);
+        let unit = self.epoch.map(|_| "s".to_owned());
+        let from = channels.channels.len();
+        channels.push(&self.name, unit, None, self.values);
+        if let Some(last) = channels.channels.last_mut() {
+            last.unapplied.extend(unknown);
         }
-        let late = match (self.start(), first) {
-            (Some(own), Some(first)) => (own.0 as f64 - first.0 as f64) + (own.1 - first.1),
-            _ => 0.0,
-        };
-        let sampling = stated.sampling().map(|sampling| sampling.later(late));
-        let text = |(name, value): (&String, &Property)| match value {
-            Property::Text(text) if meaning(name) == Some(Meaning::Unit) => Some(text.clone()),
-            _ => None,
-        };
-        let unit = match self.epoch {
-            Some(_) => Some("s".to_owned()),
-            None => self.properties.iter().find_map(text),
-        };
-        channels.push(&self.name, unit, sampling, self.values);
-        channels.leave_unapplied(&stated.unapplied);
+        for (name, value) in statements(&self.properties, first) {
+            channels.state(from, name, value);
+        }
     }
 }

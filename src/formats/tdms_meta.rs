@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::bytes::Bytes;
+use super::names;
 use super::number::{ByteOrder, NumberType};
-use super::stated::meaning;
 use crate::error::InputError;
 
 /// Index of raw data: none, and as in the segment before.
@@ -69,6 +69,32 @@ pub(super) enum Property {
     Other,
 }
 
+impl Property {
+    /// The value as text; of a time the seconds since another.
+    fn text(&self, since: (i64, f64)) -> Option<String> {
+        match self {
+            Self::Number(number) => Some(number.to_string()),
+            Self::Text(text) => Some(text.clone()),
+            Self::Time(seconds, fraction) => {
+                let whole = seconds.wrapping_sub(since.0) as f64;
+                Some((whole + (fraction - since.1)).to_string())
+            }
+            Self::Other => None,
+        }
+    }
+}
+
+/// What properties state beside scales: names and values; times in seconds since another.
+pub(super) fn statements(
+    properties: &Properties,
+    since: (i64, f64),
+) -> impl Iterator<Item = (&str, Vec<String>)> {
+    let others = properties
+        .iter()
+        .filter(|(name, _)| !name.starts_with("NI_Scal"));
+    others.filter_map(move |(name, value)| Some((name.as_str(), vec![value.text(since)?])))
+}
+
 /// Properties by name.
 pub(super) type Properties = BTreeMap<String, Property>;
 
@@ -101,7 +127,7 @@ pub(super) fn object(bytes: &mut Bytes) -> Result<Object, InputError> {
     for _ in 0..bytes.u32(what)? {
         let name = text(bytes)?;
         let value = property(bytes)?;
-        if meaning(&name).is_some() || USED.iter().any(|used| name.starts_with(used)) {
+        if names::read(&name).is_some() || USED.iter().any(|used| name.starts_with(used)) {
             properties.insert(name, value);
         }
     }
@@ -194,10 +220,10 @@ fn text(bytes: &mut Bytes) -> Result<String, InputError> {
     Ok(String::from_utf8_lossy(bytes.take(u64::from(length), what)?).into_owned())
 }
 
-/// The dotted path of a channel, `group.channel`; `None` for a group and the root.
+/// The dotted path of a channel, `group.channel`, and true; that of a group, and false.
 ///
 /// In the file it is `/'group'/'channel'`, with quotes doubled.
-pub(super) fn dotted(path: &str) -> Option<String> {
+pub(super) fn dotted(path: &str) -> Option<(String, bool)> {
     let mut parts = Vec::new();
     let mut rest = path;
     while let Some(quoted) = rest.strip_prefix("/'") {
@@ -219,7 +245,7 @@ pub(super) fn dotted(path: &str) -> Option<String> {
         }
         parts.push(part);
     }
-    (parts.len() > 1).then(|| parts.join("."))
+    Some((parts.join("."), parts.len() > 1))
 }
 
 #[cfg(test)]
@@ -229,14 +255,15 @@ mod tests {
     #[test]
     fn paths_are_dotted() {
         for (path, expected) in [
-            ("/'Group'/'Channel 1'", Some("Group.Channel 1")),
-            ("/'it''s'/'a/b'", Some("it's.a/b")),
-            ("/'Group'", None),
-            ("/", None),
+            ("/'Group'/'Channel 1'", Some(("Group.Channel 1", true))),
+            ("/'it''s'/'a/b'", Some(("it's.a/b", true))),
+            ("/'Group'", Some(("Group", false))),
+            ("/", Some(("", false))),
             ("/'a'/'b", None),
-            ("", None),
+            ("", Some(("", false))),
         ] {
-            assert_eq!(dotted(path).as_deref(), expected, "{path}");
+            let expected = expected.map(|(path, is_channel)| (path.to_owned(), is_channel));
+            assert_eq!(dotted(path), expected, "{path}");
         }
     }
 }

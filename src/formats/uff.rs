@@ -5,14 +5,13 @@
 
 use std::path::Path;
 
+use super::Channels;
 use super::budget::Budget;
 use super::bytes::Bytes;
 use super::number::{ByteOrder, NumberType};
 use super::uff_header::{FunctionHeader, LINES, UnitFactors, number};
-use super::{Channels, Sampling};
 use crate::error::InputError;
 use crate::text_io::quote;
-use crate::units::{Quantity, Unit};
 
 /// Line before and after a data set.
 const MARK: &str = "-1";
@@ -31,7 +30,8 @@ pub(super) fn begins_so(bytes: &[u8]) -> bool {
         .map(str::trim)
         .skip_while(|line| line.is_empty());
     let number = |line: &str| line.starts_with(|c: char| c.is_ascii_digit());
-    lines.next() == Some(MARK) && lines.next().is_some_and(number)
+    // pyuff writes two marks before a set.
+    lines.next() == Some(MARK) && lines.find(|line| *line != MARK).is_some_and(number)
 }
 
 /// The lines of the file; binary data between them are skipped by `at`.
@@ -88,7 +88,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
         if line.trim() != MARK {
             continue;
         }
-        let Some(first) = lines.next() else { break };
+        let first = std::iter::from_fn(|| lines.next()).find(|line| line.trim() != MARK);
+        let Some(first) = first else { break };
         let mut words = first.split_whitespace();
         match words.next() {
             Some("58") => function(&mut lines, units, &mut channels, budget)?,
@@ -306,14 +307,11 @@ fn add(
         channels.push(&header.name, header.unit, None, values);
         return Ok(());
     }
-    let unit = Unit::recognise(Quantity::Time, &header.time_unit);
-    let is_unknown = unit.is_none() && !header.time_unit.is_empty();
-    let factor = unit.map_or(1.0, |unit| unit.factor());
-    let sampling = Sampling::interval(factor * header.start, factor * header.step);
-    channels.push(&header.name, header.unit, sampling, numbers);
-    if is_unknown {
-        channels.leave_unapplied(&[format!("times in {}", quote(&header.time_unit))]);
-    }
+    let from = channels.channels.len();
+    channels.push(&header.name, header.unit, None, numbers);
+    channels.state(from, "dt", vec![header.step.to_string()]);
+    channels.state(from, "t0", vec![header.start.to_string()]);
+    channels.state(from, "xunit", vec![header.time_unit]);
     Ok(())
 }
 

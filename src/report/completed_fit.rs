@@ -121,12 +121,17 @@ pub fn model_predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
     let coefficients = &found.best.evaluation.nodal;
     let system = &model.problem.system;
     let one = |state: &State| {
-        let responses = predict(system, coefficients, model.truth.as_ref(), &[*state]);
+        let responses = predict(
+            system,
+            coefficients,
+            model.truth.as_ref(),
+            std::slice::from_ref(state),
+        );
         match responses {
             Ok(responses) => responses.into_iter().map(|m| m.summary).collect(),
             Err(breakdown) => vec![Prediction {
-                displacement: state.displacement,
-                velocity: state.velocity,
+                displacement: state.displacement(0),
+                velocity: state.velocity(0),
                 cost: None,
                 energy: None,
                 largest: None,

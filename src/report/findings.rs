@@ -366,6 +366,19 @@ pub fn record_error(error: &RecordError) -> String {
             significant(*error, 2),
             significant(*time, 6)
         ),
+        RecordError::InputJump {
+            experiment,
+            input,
+            between: [from, to],
+            jump,
+        } => format!(
+            "the {} of {experiment} jumps by {} {} between its samples at {} and {} s, and its interpolation does not have the time of the jump",
+            input.name().replace('_', " "),
+            significant(*jump, 3),
+            input.unit(),
+            significant(*from, 6),
+            significant(*to, 6)
+        ),
         RecordError::InputSign { experiment } => {
             format!("the input of {experiment} has the wrong sign")
         }

@@ -24,6 +24,8 @@ pub struct RunAssessment {
     pub(super) assessment: Option<FitAssessment>,
     /// Intervals of a fit of the equation error, or the reason why there are none; `None` for other fits, and without parameters.
     pub(super) equation: Option<Result<EquationErrorIntervals, NoIntervals>>,
+    /// True where an unmeasured force acts, so that a free response or the equation error does not determine the damping.
+    pub(super) lacks_force: bool,
     /// Terms missing from the equation of motion, by its error; none for other fits.
     pub(super) missing_terms: Vec<MissingTerm>,
     /// Residual of the equation of motion beside its forces, by its error; `None` for other fits, and without a minimum.
@@ -45,10 +47,17 @@ impl RunAssessment {
             Some(assessment) => assessment.plausibility.residuals.clone(),
             None => all_diagnostics(&model.problem, &fit.best.evaluation),
         };
+        let equation = (!is_simulated && model.problem.parameters() > 0)
+            .then(|| EquationErrorIntervals::of(&model.problem, fit));
+        let is_poor = |d: &ResidualDiagnostics| d.fit_percent < POOR;
+        let lacks_force = match &equation {
+            Some(equation) => matches!(equation, Err(NoIntervals::UnmeasuredForce)),
+            None => model.is_kept_up() && diagnostics.iter().flatten().all(is_poor),
+        };
         Self {
             assessment,
-            equation: (!is_simulated && model.problem.parameters() > 0)
-                .then(|| EquationErrorIntervals::of(&model.problem, fit)),
+            lacks_force,
+            equation,
             missing_terms: match is_simulated {
                 true => Vec::new(),
                 false => missing_terms(&model.problem, &fit.best.parameters),
@@ -61,11 +70,6 @@ impl RunAssessment {
                 .collect(),
             diagnostics,
         }
-    }
-
-    /// True where an unmeasured force acts, so that the equation error does not determine the damping.
-    pub(super) fn lacks_force(&self) -> bool {
-        matches!(self.equation, Some(Err(NoIntervals::UnmeasuredForce)))
     }
 
     /// Variances of the scalars with the indices `range` of a simulated response, if standard errors are meaningful.

@@ -11,7 +11,7 @@ use kmcfit_core::internals::identifiability::{ScalingAmbiguity, Sensitivity, str
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::record::{Channel, Experiment};
 use kmcfit_core::internals::signal::{Spectrum, median_spacing};
-use kmcfit_core::internals::solvers::{FEW_PARAMETERS, Solver};
+use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 
 /// Largest deviation of distances from multiples of the median one, relative to it, of regular samples with gaps: rounded times have some.
 const REGULAR: f64 = 0.05;
@@ -40,7 +40,6 @@ pub fn overview(model: &Model) -> String {
     ));
     let start = model.problem.evaluate(&model.problem.start());
     let (known, mut reasons) = identifiability(model, start.as_ref().ok());
-    reasons.extend(unmeasured_force(model));
     match &start {
         Ok(evaluation) => lines.push(start_values(model, evaluation)),
         Err(error) => reasons.push(format!("the start values have no response: {error}")),
@@ -48,28 +47,6 @@ pub fn overview(model: &Model) -> String {
     lines.extend(known);
     lines.push(verdict(model, &reasons));
     lines.join("\n") + "\n"
-}
-
-/// Share of the root mean square of the first quarter of a free record that its last quarter keeps, from which on a force keeps the vibration up.
-const KEPT: f64 = 0.5;
-
-/// The statement that the equation error does not determine the damping of records that an unmeasured force keeps in motion.
-fn unmeasured_force(model: &Model) -> Option<String> {
-    let experiments = &model.problem.experiments;
-    let is_kept_up = |experiment: &Experiment| {
-        let channel = experiment.channels.first();
-        let values = channel.map_or(&[][..], |channel| channel.observed());
-        let quarter = values.len() / 4;
-        let size = |part: &[f64]| standard_deviation(part);
-        experiment.is_free()
-            && quarter > 1
-            && size(&values[values.len() - quarter..]) > KEPT * size(&values[..quarter])
-    };
-    let is_affected =
-        model.settings.solver == Solver::EquationError && experiments.iter().all(is_kept_up);
-    is_affected.then(|| {
-        "no force is measured, and the vibration does not decay: the equation error does not determine the damping, nor intervals".to_owned()
-    })
 }
 
 /// Samples, sampling, frequency and size of a channel.

@@ -276,7 +276,7 @@ impl FittedModel<'_> {
             terms: (problem.functions.coefficient_set(0).iter().skip(1))
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
-            friction_width: problem.system.terms.iter().find_map(|t| match t {
+            friction_width: problem.system.laws().iter().find_map(|t| match t {
                 Law::CoulombFriction { width } => Some(*width),
                 _ => None,
             }),

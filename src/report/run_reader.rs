@@ -12,7 +12,7 @@ use crate::results;
 use crate::text_io::{JSON, read_text, read_text_within};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Method, NodalCoefficients, System};
 use serde::Deserialize;
 use serde_json::Value;
@@ -33,7 +33,7 @@ const PER_NODE: u64 = 600;
 /// use kmcfit::Run;
 /// let run = Run::open("runs/paper")?;
 /// println!("{}: J = {:e}", run.document.outcome.status.name(), run.document.cost.r#final);
-/// let mass = &run.coefficients.mass;                            // kg, one value per node
+/// let mass = &run.coefficients.inertias[0];                            // kg, one value per node
 /// for (t, m) in run.system.grid.times().iter().zip(mass) {
 ///     println!("{t} s: {m} kg");
 /// }
@@ -256,7 +256,7 @@ fn system(
     let system = System {
         grid,
         method,
-        terms,
+        structure: Structure::one(terms),
     };
     Ok((system, quantities))
 }
@@ -373,7 +373,7 @@ fn coefficients(
         Ok(at_nodes(rows, nodes, steps))
     };
     Ok::<_, InputError>(NodalCoefficients {
-        mass: column(CoefficientKind::Mass)?,
+        inertias: vec![column(CoefficientKind::Mass)?],
         coefficients: quantities
             .iter()
             .map(|q| column(*q))

@@ -1,7 +1,8 @@
 //! Advice is tried before it is given: each change of the model is fitted, and recommended only if the verdict or the criterion improves.
 //!
-//! All trials together have as many iterations as the fit itself, so that they take at most about its time; what does not fit into these is
-//! *not tried*. The number of iterations, not the time, is the limit: the same input gives the same advice on every machine.
+//! A trial of other functions or nodes starts at the estimates of a fit that is converged and not inadequate. All trials together have as many iterations as the fit and its assessment take the time of,
+//! counted at the nodes of its grid, so that they take at most about its time; what does not fit into these is *not tried*. The number of
+//! iterations, not the time, is the limit: the same input gives the same advice on every machine.
 
 use super::document::ResultDocument;
 use super::fit_assessment::RunAssessment;
@@ -12,13 +13,15 @@ use crate::finding::Finding;
 use crate::fitting::fit_model;
 use crate::number_format::significant;
 use kmcfit_core::internals::assessment::VerdictLevel;
-use kmcfit_core::internals::solvers::{Fit, IterationRecord, Observer};
+use kmcfit_core::internals::solvers::{Fit, Initial, IterationRecord, Observer, Status};
 use std::cmp::Ordering::Equal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Fewest iterations of all trials: a fit that begins near its optimum has few.
-const FEWEST: usize = 60;
+/// Iterations that take the time of an assessment: its refits, tests and a response with half the step.
+const ASSESSMENT: usize = 20;
+/// Iterations times nodes that take a few hundredths of a second, which nobody waits for.
+const SHORT: usize = 100_000;
 /// Decrease of BIC from which a change is worth it: odds of 20 to 1 (6 = 2 ln 20).
 const BETTER: f64 = 6.0;
 
@@ -47,21 +50,24 @@ pub fn advice(
     document: &ResultDocument,
 ) -> Vec<Finding> {
     let searches = fit.attempts.iter().map(|attempt| attempt.history.len());
-    let mut left = (searches.sum::<usize>() + fit.history.len()).max(FEWEST);
+    let iterations = ASSESSMENT + searches.sum::<usize>() + fit.history.len();
+    let mut left = SHORT.max(iterations * nodes(model));
     let mut better: Vec<(Gain, Finding)> = Vec::new();
     let mut others: Vec<Finding> = Vec::new();
     for suggestion in suggestions(document, model) {
         match &suggestion.step {
             Step::Outside => others.push(suggestion.finding(None)),
             Step::Untried => others.push(suggestion.finding(Some("not tried"))),
-            Step::Change(overrides) => match tried(file, model, document, overrides, &mut left) {
-                Outcome::Better(gain, words) => {
-                    let words = format!("tried: {words}");
-                    better.push((gain, suggestion.finding(Some(&words))));
+            Step::Change(overrides) => {
+                match tried(file, model, fit, document, overrides, &mut left) {
+                    Outcome::Better(gain, words) => {
+                        let words = format!("tried: {words}");
+                        better.push((gain, suggestion.finding(Some(&words))));
+                    }
+                    Outcome::TooLong => others.push(suggestion.finding(Some("not tried"))),
+                    Outcome::Worse => {}
                 }
-                Outcome::TooLong => others.push(suggestion.finding(Some("not tried"))),
-                Outcome::Worse => {}
-            },
+            }
         }
     }
     // The sort is stable: equal ones keep the order of the suggestions.
@@ -92,10 +98,17 @@ fn filtered_nodes(model: &Model) -> usize {
     filtered.map(|experiment| experiment.nodes).sum()
 }
 
-/// Fits the changed model in at most `left` iterations, which are counted down.
+/// Nodes of all records.
+fn nodes(model: &Model) -> usize {
+    let experiments = model.problem.experiments.iter();
+    experiments.map(|experiment| experiment.nodes).sum()
+}
+
+/// Fits the changed model in at most `left` iterations times nodes, which are counted down.
 fn tried(
     file: &ModelFile,
     before: &Model,
+    fit: &Fit,
     document: &ResultDocument,
     overrides: &[String],
     left: &mut usize,
@@ -117,10 +130,23 @@ fn tried(
     if filtered_nodes(&model) > filtered_nodes(before) + MOST_FILTERED {
         return Outcome::TooLong;
     }
+    let functions = &before.problem.functions;
+    let start = (model.problem.functions).start_at(functions, &fit.best.parameters);
+    let near = (model.problem.clone()).with(|parts| parts.functions.set_start(&start));
+    let level = document.verdict.as_ref().map(|verdict| verdict.level);
+    let of_model = |o: &String| o.starts_with("functions.") || o.starts_with("grid.");
+    let is_near = fit.outcome.status == Status::Converged
+        && level != Some(VerdictLevel::Inadequate)
+        && overrides.iter().all(of_model);
+    if let (Ok(near), true) = (near, is_near) {
+        model.problem = near;
+        model.settings.initial = Initial::Near;
+    }
+    let each = nodes(&model);
     let limit = Arc::new(AtomicBool::new(false));
     model.settings.interrupt = Some(Arc::clone(&limit));
     let mut count = |_: &IterationRecord| {
-        *left = left.saturating_sub(1);
+        *left = left.saturating_sub(each);
         if *left == 0 || is_stopped() {
             limit.store(true, Ordering::Relaxed);
         }

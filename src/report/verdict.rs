@@ -46,14 +46,33 @@ impl FittedModel<'_> {
             // Ratios are what is reported.
             reasons.retain(|reason| !matches!(reason, VerdictReason::OnlyRatios));
         }
-        reasons.extend(self.implausible().map(VerdictReason::ImplausibleUnits));
+        // Codes in place of samples are no motion.
+        let has_codes = self
+            .model
+            .warnings
+            .iter()
+            .any(|w| w.kind == "missing_codes");
+        let implausible = self.implausible().filter(|_| !has_codes);
+        reasons.extend(implausible.map(VerdictReason::ImplausibleUnits));
         let has_units = |r: &VerdictReason| matches!(r, VerdictReason::ImplausibleUnits(_));
-        let is_doubtful = |w: &Finding| DataWarning::DOUBTFUL_UNITS.contains(&w.kind.as_str());
-        if !reasons.iter().any(has_units) && self.model.warnings.iter().any(is_doubtful) {
+        // Implausible magnitudes are a reason already; what the file states is one in any case.
+        let doubtful = |kinds: &[&str]| -> Vec<&str> {
+            let of_kind = (self.model.warnings.iter()).filter(|w| kinds.contains(&w.kind.as_str()));
+            of_kind
+                .filter_map(|w| Some(w.text.split_once(": ")?.1))
+                .collect()
+        };
+        let mut doubts = doubtful(&DataWarning::STATED_UNITS);
+        doubts.dedup();
+        if doubts.is_empty() && !reasons.iter().any(has_units) {
+            doubts = doubtful(&DataWarning::DOUBTFUL_UNITS);
+            doubts.truncate(1);
+        }
+        if !doubts.is_empty() {
             reasons.push(VerdictReason::DoubtfulUnits);
         }
         let balance = self.run_assessment.balance.as_ref();
-        match self.run_assessment.lacks_force() {
+        match self.run_assessment.lacks_force {
             true => reasons.push(VerdictReason::UnmeasuredForce),
             false => reasons.extend(balance.and_then(of_balance)),
         }
@@ -95,11 +114,8 @@ impl FittedModel<'_> {
                 finding
             }
             VerdictReason::DoubtfulUnits => {
-                let warning = self.model.warnings.iter().find(|w| is_doubtful(w));
                 let mut finding = reason_in_words(reason);
-                if let Some((_, text)) = warning.and_then(|w| w.text.split_once(": ")) {
-                    finding.text = text.to_owned();
-                }
+                finding.text = doubts.join("; ");
                 finding
             }
             _ => reason_in_words(reason),
@@ -273,7 +289,7 @@ impl FittedModel<'_> {
         {
             self.unit(function).clone_into(&mut estimate.unit);
         }
-        if self.run_assessment.lacks_force() {
+        if self.run_assessment.lacks_force {
             let is_damping = |name: &str| matches!(name, "damping" | "damping_ratio" | "c_over_m");
             for (_, estimate) in found.iter_mut().filter(|(name, _)| is_damping(name)) {
                 estimate.value = f64::NAN;
@@ -334,6 +350,14 @@ fn faulty_samples(warning: &Finding) -> Option<VerdictReason> {
         "saturation" => {
             let channel = text("channel")?;
             return Some(VerdictReason::Saturation { channel });
+        }
+        "missing_codes" => {
+            let channels = warning.quantities.get("channels")?.as_array()?;
+            return Some(VerdictReason::FaultySamples {
+                experiment: text("experiment")?,
+                channel: channels.first()?.as_str()?.to_owned(),
+                fault: SampleFault::MissingCodes,
+            });
         }
         "dropouts" => SampleFault::Dropouts,
         "spikes" | "outliers" => SampleFault::Spikes,
@@ -403,6 +427,9 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
                     "the {channel} of {experiment} is held at a constant value in part (dropouts)"
                 )
             }
+            SampleFault::MissingCodes => format!(
+                "the {channel} of {experiment} has values that stand for missing samples (`missing`)"
+            ),
             SampleFault::Spikes => format!("the {channel} of {experiment} has spikes"),
             SampleFault::CoarseInput => format!(
                 "the quantisation error of the {channel} of {experiment} is not small beside the residuals"

@@ -39,6 +39,7 @@ impl Table {
             channels,
             unusable,
             notes,
+            ..
         } = formats::read(path, &bytes, binary)?;
         // The numbers take as much again.
         drop(bytes);

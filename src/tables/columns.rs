@@ -4,9 +4,9 @@ use std::fmt;
 
 use super::Table;
 use crate::error::InputError;
+use crate::headings::split_unit;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
-use crate::units::Unit;
 
 /// A column, by its name or by its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -143,89 +143,5 @@ fn numbers(width: usize) -> String {
     match width {
         1 => "the number 1: there is one column".to_owned(),
         width => format!("a number from 1 to {width}"),
-    }
-}
-
-/// Separators between a name and its unit.
-const SEPARATORS: [&str; 7] = ["/", ",", ":", ";", "|", " - ", " in "];
-/// Last words of names that state numbers of a converter.
-const COUNTS: [&str; 6] = ["lsb", "counts", "count", "adc", "digits", "codes"];
-/// First words of texts in brackets that are no units.
-pub(super) const REMARKS: &str = "left right front rear back top bottom upper lower mid middle x y z xx yy zz filtered smoothed smooth corrected \
-    measured absolute relative abs rel total mean ch channel run trial test sensor node no input output";
-
-/// A header's name and unit: `acc [g]`, `acc (g) Run 1`, `acc / g`, `acc, g`, `acc in g`, `X (16g)`. A text in brackets that is no unit is
-/// returned as one, but for remarks such as `(left)`.
-pub(super) fn split_unit(header: &str) -> (&str, Option<&str>) {
-    let header = header.trim_matches(['"', '\'']).trim();
-    if header.contains('/') && Unit::any(header).is_some() {
-        return ("", Some(header));
-    }
-    let groups = || bracketed(header);
-    let unit = |text: &&str| Unit::any(without_range(text)).is_some();
-    let name = |at: usize, end: usize| match header[..at].trim() {
-        "" => header[end..].trim(),
-        name => name,
-    };
-    if let Some((at, text, end)) = groups().find(|(_, text, _)| unit(text)) {
-        return (name(at, end), Some(without_range(text)));
-    }
-    // The longest text that is a unit: `km/h` of `v in km/h`.
-    let behind = SEPARATORS
-        .iter()
-        .flat_map(|sign| header.match_indices(sign));
-    let behind = behind.filter(|(at, sign)| *at > 0 && unit(&&header[at + sign.len()..]));
-    let behind = behind
-        .min_by_key(|(at, _)| *at)
-        .map(|(at, sign)| (header[..at].trim(), Some(header[at + sign.len()..].trim())));
-    if let Some(found) = behind {
-        return found;
-    }
-    // A number, or a word such as `left`.
-    let is_remark = |at: usize, text: &str| {
-        let mut words = text.split(|c: char| !c.is_alphabetic());
-        let first = words.next().unwrap_or_default().to_lowercase();
-        let is_number = text
-            .chars()
-            .all(|c| c.is_ascii_digit() || "#. ".contains(c));
-        header[at..].starts_with('(') && (is_number || REMARKS.split(' ').any(|word| word == first))
-    };
-    match groups().find(|(at, text, _)| !text.is_empty() && !is_remark(*at, text)) {
-        Some((at, text, end)) => (name(at, end), Some(text)),
-        None => match (header.split_once(" / "), header.rsplit_once(['_', ' '])) {
-            (Some((name, text)), _) => (name.trim(), Some(text.trim())),
-            (_, Some((name, text))) if COUNTS.contains(&&*text.to_lowercase()) => {
-                (name, Some(text))
-            }
-            _ => (header, None),
-        },
-    }
-}
-
-/// The texts in brackets with their places: that of the opening bracket, and that behind the closing one. The last group comes first.
-fn bracketed(header: &str) -> impl Iterator<Item = (usize, &str, usize)> {
-    let pairs = [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')];
-    let opening = header.char_indices().filter_map(move |(at, c)| {
-        let (open, close) = pairs.into_iter().find(|pair| pair.0 == c)?;
-        let mut depth = 0;
-        let end = header[at..].char_indices().find(|(_, c)| {
-            depth += i32::from(*c == open) - i32::from(*c == close);
-            depth == 0
-        });
-        let end = at + end?.0;
-        Some((at, header[at + 1..end].trim(), end + 1))
-    });
-    opening.collect::<Vec<_>>().into_iter().rev()
-}
-
-/// A unit without the range of a sensor before it: `g` of `±16g`.
-fn without_range(text: &str) -> &str {
-    let text = text.trim();
-    let unsigned = text.trim_start_matches(['±', '+', '-', '/']);
-    match unsigned.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.') {
-        rest if rest.starts_with(|c: char| c.is_alphabetic() || c == '%') && rest != unsigned => {
-            rest
-        }
-        _ => text,
     }
 }

@@ -8,10 +8,11 @@ use std::rc::Rc;
 
 use csv::StringRecord;
 
-use super::clock::Clock;
 use super::field::{self, Field};
 use super::format::TableFormat;
 use super::rows::CsvText;
+use crate::clock::Clock;
+use crate::formats::{Meaning, meaning};
 use crate::units::Unit;
 
 /// Length of the examined beginning of a file, bytes: some thousand rows, more than any preamble.
@@ -281,10 +282,26 @@ impl DialectCandidate {
         while data > 0 && begins_as_data(&self.records[data - 1]) {
             data -= 1;
         }
-        let (header, units, data) = match format.skip {
-            Some(_) => self.top(format, begins_as_data(self.records.first()?), data),
-            None => self.head(format, data),
+        // Rows such as `Scale,1,1` before the samples state something of these.
+        let is_key = |record: &StringRecord| {
+            record.get(0).is_some_and(|text| meaning(text).is_some())
+                && FieldCounts::of(record, self.decimal).numbers > 0
         };
+        let is_key = |row: usize| self.records.get(row).is_some_and(is_key);
+        let mut top = data;
+        while top > 1 && is_key(top - 1) {
+            top -= 1;
+        }
+        let (header, units, mut data) = match format.skip {
+            Some(_) => self.top(format, begins_as_data(self.records.first()?), data),
+            None => {
+                let (header, units, after) = self.head(format, top);
+                (header, units, after.max(data))
+            }
+        };
+        while header.is_some() && is_key(data) {
+            data += 1;
+        }
         Some(Layout {
             delimiter: self.delimiter,
             decimal: self.decimal,
@@ -316,8 +333,19 @@ impl DialectCandidate {
 
     /// Rows of names and units before the row `data`, and the first data row.
     fn head(&self, format: &TableFormat, data: usize) -> (Option<usize>, Option<usize>, usize) {
-        let above = data.checked_sub(1);
-        let two_above = data.checked_sub(2);
+        // The row of the name of an index, as pandas writes it below names of several levels.
+        let is_index = |record: &StringRecord| {
+            record.iter().skip(1).all(str::is_empty)
+                && record.get(0).is_some_and(|name| !name.is_empty())
+        };
+        let is_index = |row: usize| {
+            self.records
+                .get(row)
+                .is_some_and(|record| record.len() > 1 && is_index(record))
+        };
+        let names = data - usize::from(data > 2 && is_index(data - 1));
+        let above = names.checked_sub(1);
+        let two_above = names.checked_sub(2);
         if format.header == Some(false) {
             let units = above.filter(|_| format.units_row == Some(true));
             return (None, units, data);
@@ -368,9 +396,13 @@ impl DialectCandidate {
     }
 }
 
-/// True if all fields are units or empty, and at least one is a unit.
+/// True if all fields but a key before them are units or empty, and at least one is a unit.
 fn are_units(record: &StringRecord) -> bool {
-    let mut texts = record.iter().filter(|text| !matches!(*text, "" | "-"));
+    let key = record
+        .get(0)
+        .filter(|text| meaning(text) == Some(Meaning::Unit));
+    let mut texts =
+        (record.iter().skip(usize::from(key.is_some()))).filter(|text| !matches!(*text, "" | "-"));
     record.iter().any(Unit::looks_like) && texts.all(Unit::looks_like)
 }
 

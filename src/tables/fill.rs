@@ -4,7 +4,6 @@ use std::path::Path;
 
 use csv::StringRecord;
 
-use super::clock::Clock;
 use super::detect::Layout;
 use super::field::{self, Field};
 use super::format::Detected;
@@ -12,9 +11,12 @@ use super::origin::ColumnValues;
 use super::rows::{CsvText, TableRows};
 use super::table::{TABLE, Table};
 use super::table_memory::TableMemory;
+use crate::clock::Clock;
 use crate::error::{InputError, Location};
+use crate::formats::{Meaning, meaning};
+use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
-use crate::units::Unit;
+use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::threads::both;
 
 /// Most columns: each takes some hundred bytes beside its fields.
@@ -37,14 +39,43 @@ impl Table {
         while let Some(line) = rows.read(&mut fields)? {
             let row = Some(count);
             check_width(&path, line, fields.len())?;
+            // Rows of statements can begin with a key above rows without: `Name,Force,Acc`.
+            let is_keyed = layout.width.is_some_and(|width| fields.len() == width + 1)
+                && fields.get(0).is_some_and(is_key);
+            if is_keyed && count < layout.data {
+                fields = fields.iter().skip(1).collect();
+            }
             if row == layout.header {
                 check_headers(&path, line, &fields, layout.decimal)?;
                 self.headers = fields.iter().map(str::to_owned).collect();
+                // Each channel can have times before it.
+                for i in 1..self.headers.len() {
+                    let count = self.headers[..i]
+                        .iter()
+                        .filter(|name| **name == self.headers[i])
+                        .count();
+                    if count > 0 && !self.headers[i].is_empty() {
+                        self.headers[i] += &format!(" #{}", count + 1);
+                    }
+                }
                 self.columns = columns(fields.len(), room)?;
                 format.header = Some(line);
             } else if row == layout.units {
                 self.units = fields.iter().map(str::to_owned).collect();
+                // `Units,kN,g` begins with a key.
+                if let Some(key) = self.units.first_mut().filter(|key| is_key(key)) {
+                    key.clear();
+                }
                 format.units_row = Some(line);
+            } else if let (Some(header), true) = (layout.header, count < layout.data) {
+                // The name of an index below the other names.
+                if let Some(first) = self
+                    .headers
+                    .first_mut()
+                    .filter(|first| count > header && first.is_empty())
+                {
+                    *first = fields.get(0).unwrap_or_default().to_owned();
+                }
             } else if count >= layout.data {
                 repeated += usize::from(!self.push(line, &fields, layout, room)?);
                 // The first row of data defines the columns.
@@ -182,6 +213,14 @@ impl Table {
     }
 }
 
+/// True for the first field of a row of names or units that is none of them.
+fn is_key(text: &str) -> bool {
+    let is_name = ["name", "names", "channel", "channels"]
+        .iter()
+        .any(|key| text.eq_ignore_ascii_case(key));
+    is_name || meaning(text) == Some(Meaning::Unit)
+}
+
 /// Allocates the columns with capacity for all rows.
 fn columns(width: usize, room: TableMemory) -> Result<Vec<ColumnValues>, InputError> {
     let column = |_| {
@@ -231,7 +270,8 @@ fn check_headers(
     }
     for (index, name) in headers.iter().enumerate() {
         let before = headers.iter().take(index).position(|other| other == name);
-        if let (Some(first), false) = (before, name.is_empty()) {
+        let is_time = quantity_of(name) == Some(Quantity::Time) && index + 1 < headers.len();
+        if let (Some(first), false) = (before, name.is_empty() || is_time) {
             return Err(error(format!("two columns have the name {}", quote(name)))
                 .found(format!("columns {} and {}", first + 1, index + 1))
                 .expected("every column name once"));

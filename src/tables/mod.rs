@@ -2,14 +2,15 @@
 //! times, and resampling.
 
 mod channels;
-mod clock;
 mod columns;
 mod detect;
 mod encoding;
 mod field;
 mod fill;
 mod format;
+mod missing_codes;
 mod origin;
+mod preamble;
 mod repeats;
 mod rows;
 mod stated;
@@ -21,6 +22,7 @@ pub mod times;
 pub use columns::ColumnName;
 pub use encoding::Encoding;
 pub use format::{Detected, TableFormat};
+pub use missing_codes::{codes, codes_of_column};
 pub use repeats::{Duplicates, RepeatedTimes, lines_in_words, repeated_times};
 pub use stated::StatedUnit;
 pub(crate) use table::TABLE;

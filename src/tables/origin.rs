@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::clock::Clock;
 use super::format::Detected;
+use crate::clock::Clock;
 use crate::error::InputError;
 use crate::formats::{Format, Sampling, Unusable};
 

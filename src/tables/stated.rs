@@ -1,10 +1,13 @@
 //! Units stated by a table: in its row of units, in brackets after a column's name, and at the end of the name.
 
 use super::Table;
-use super::columns::{REMARKS, split_unit};
 use crate::error::InputError;
+use crate::headings::{REMARKS, range_of, split_unit};
 use crate::text_io::quote;
 use crate::units::{Quantity, Unit, unbracketed};
+
+/// Part of a range above which samples are outside it.
+const EXCESS: f64 = 1.5;
 
 /// Unit of one column as stated by a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,11 +35,6 @@ impl<'a> StatedUnit<'a> {
     /// The unit of this quantity at the end of the name, as in `y_mm` and `a_m_per_s2`, or before remarks and numbers, as in `acc_g_filtered`.
     pub fn suffix(&self, kind: Quantity) -> Option<Unit> {
         let mut name = self.name;
-        let is_remark = |word: &str| {
-            let small = word.to_lowercase();
-            word.chars().all(|c| c.is_ascii_digit())
-                || (REMARKS.split(' ').chain(["raw", "filt"])).any(|remark| remark == small)
-        };
         while let Some((before, word)) = name.rsplit_once('_')
             && is_remark(word)
         {
@@ -49,10 +47,26 @@ impl<'a> StatedUnit<'a> {
         })
     }
 
-    /// The unit of this quantity as the last word of the name, as in `Force N`.
+    /// The unit of this quantity as the last word of the name but for remarks, as in `Force N`, `acc.g`, `accelerationInG`, `acc, g, ch 3`.
     pub fn last_word(&self, kind: Quantity) -> Option<Unit> {
-        let (_, last) = self.name.rsplit_once(' ')?;
-        Unit::recognise(kind, last)
+        let unit = |word: &str| Unit::recognise(kind, word);
+        let (_, last) = self.name.rsplit_once(' ').unwrap_or_default();
+        let words = self.name.split([' ', '_', '.', '-', ',', '*']);
+        let mut words = words.filter(|word| !word.is_empty());
+        let first = words.next().unwrap_or(self.name);
+        let word = words.rfind(|word| !is_remark(word));
+        unit(last).or_else(|| unit(word?)).or_else(|| {
+            // `accG`, `forcekN`.
+            let name = word.unwrap_or(first);
+            let (at, _) = name.char_indices().rfind(|(_, c)| c.is_uppercase())?;
+            let before = name[..at]
+                .chars()
+                .next_back()
+                .filter(|c| c.is_lowercase())?;
+            let prefixed = at - before.len_utf8();
+            let with_prefix = || unit(&name[prefixed..]).filter(|_| "kmuµ".contains(before));
+            with_prefix().or_else(|| unit(&name[at..]))
+        })
     }
 
     /// True if the row of units and the name state different units for every quantity.
@@ -68,7 +82,31 @@ impl<'a> StatedUnit<'a> {
     }
 }
 
+/// True for a number, or a word that is no unit.
+fn is_remark(word: &str) -> bool {
+    let small = word.to_lowercase();
+    word.chars().all(|c| c.is_ascii_digit())
+        || REMARKS
+            .split(' ')
+            .chain(["raw", "filt"])
+            .any(|remark| remark == small)
+}
+
 impl Table {
+    /// States the range of a heading that the samples exceed: they are counts of a converter.
+    pub(super) fn check_ranges(&mut self) {
+        for (header, column) in self.headers.iter().zip(&mut self.columns) {
+            let largest = column
+                .samples
+                .iter()
+                .fold(0.0f64, |most, x| most.max(x.abs()));
+            if let Some(range) = range_of(header).filter(|range| largest > EXCESS * range) {
+                let statement = format!("a range of {range}, which the samples exceed");
+                column.unapplied.push(statement);
+            }
+        }
+    }
+
     /// The stated unit of a column.
     pub fn stated_unit(&self, index: usize) -> StatedUnit<'_> {
         let (name, header) = split_unit(self.headers().get(index).map_or("", String::as_str));

@@ -3,13 +3,13 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::clock::DAY;
 use super::detect::{Layout, detect, without_footer};
 use super::encoding::decode;
 use super::format::{Detected, TableFormat};
 use super::origin::{ColumnValues, Origin};
 use super::rows::{CsvText, with_newlines};
 use super::table_memory::TableMemory;
+use crate::clock::DAY;
 use crate::error::{InputError, Location};
 use crate::formats;
 use crate::number_format::significant;
@@ -348,7 +348,6 @@ impl Table {
         if table.headers.is_empty() && format.header.is_none() {
             table.name_by_comments(&text, layout.delimiter);
         }
-        table.units_by_preamble(&text, layout.delimiter);
         // A row of units without names begins with that of the times.
         let is_time = |name: &String| Unit::recognise(Quantity::Time, name).is_some();
         let mut others = table.headers.iter().skip(1);
@@ -359,14 +358,8 @@ impl Table {
         {
             table.units.clone_from(&table.headers);
         }
-        // The rows of the table are not examined for a rate.
-        let before = table.lines.first().map_or(0, |line| line - 1);
-        let mut lines = text.lines().take(before).peekable();
-        while let Some(line) = lines.next()
-            && table.stated_step.is_none()
-        {
-            table.stated_step = formats::step_of_line(line, lines.peek());
-        }
+        table.state_by_preamble(&text, layout.delimiter);
+        table.check_ranges();
         table.state_clocks();
         Ok(table)
     }

@@ -2,20 +2,21 @@
 
 use super::Table;
 use super::origin::ColumnValues;
+use crate::formats::{Channel, align, own_times};
+use crate::headings::split_unit;
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
-use crate::units::{Quantity, Unit, unbracketed};
+use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::signal::median;
 
 /// Delimiters of names in a comment beside that of the rows.
 const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
-/// Keys of a line of units before the rows.
-const UNIT_KEYS: [&str; 4] = ["units", "unit", "einheiten", "einheit"];
 /// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.
 const SINCE_1970: [(f64, &str); 3] = [(1e11, "ms"), (1e14, "µs"), (1e17, "ns")];
-/// Serial days of spreadsheets, of the years from 1982 to 2119, and the spacing (s) below which these are no seconds.
-const SERIAL_DAYS: std::ops::Range<f64> = 3e4..8e4;
+/// Days of the years from 1982 to 2076, as spreadsheets and modified Julian days, MATLAB, and Julian days count them; and the spacing (s)
+/// below which these are no seconds.
+const DAYS: [std::ops::Range<f64>; 3] = [3e4..8e4, 7.2e5..7.6e5, 2.44e6..2.48e6];
 const DENSE: f64 = 1e-4;
 /// Relative difference below which two rates are the same.
 const SAME_RATE: f64 = 0.02;
@@ -59,45 +60,6 @@ impl Table {
         if names.iter().all(is_name) {
             self.headers = names;
             self.units = units;
-        }
-    }
-
-    /// Takes the units of a line such as `# units: s, N, g` before the rows, where it has as many as there are columns, or one less beside times;
-    /// another number of units is stated and not applied.
-    pub(super) fn units_by_preamble(&mut self, text: &str, delimiter: char) {
-        let before = self.lines.first().map_or(0, |line| line.saturating_sub(1));
-        let stated = text.lines().take(before).find_map(|line| {
-            let line = line.trim_start_matches(|c: char| !c.is_alphanumeric());
-            let (word, rest) = line.split_once([':', '='])?;
-            let is_key = |key: &str| word.trim().eq_ignore_ascii_case(key);
-            UNIT_KEYS
-                .iter()
-                .any(|key| is_key(key))
-                .then_some(rest.trim())
-        });
-        let Some(stated) = stated.filter(|_| self.units.is_empty()) else {
-            return;
-        };
-        let signs = || std::iter::once(delimiter).chain(DELIMITERS);
-        let is_named = |text: &String| Unit::any(unbracketed(text)).is_some();
-        let is_unit = |text: &String| text == "-" || is_named(text);
-        let begins_with_times = quantity_of(self.quantity_name(0)) == Some(Quantity::Time);
-        let units = signs().find_map(|sign| {
-            let mut fields = split(stated, sign);
-            if begins_with_times && fields.len() + 1 == self.columns.len() {
-                fields.insert(0, "-".into());
-            }
-            (fields.len() == self.columns.len() && fields.iter().all(is_unit)).then_some(fields)
-        });
-        match units {
-            Some(units) => self.units = units,
-            // The number of a device is none.
-            None if !signs().any(|sign| split(stated, sign).iter().any(is_named)) => {}
-            None => {
-                let statement = format!("the units {}", quote(stated));
-                let columns = self.columns.iter_mut();
-                columns.for_each(|column| column.unapplied.push(statement.clone()));
-            }
         }
     }
 
@@ -207,18 +169,20 @@ impl Table {
         }
         let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let is_dense = !spacings.is_empty() && (0.0..DENSE).contains(&median(&*spacings));
-        (SERIAL_DAYS.contains(&first) && is_dense).then_some("day")
+        let is_day = DAYS.iter().any(|days| days.contains(&first));
+        (is_day && is_dense).then_some("day")
     }
 
-    fn state_unit(&mut self, index: usize, unit: &str) {
+    pub(super) fn state_unit(&mut self, index: usize, unit: &str) {
         self.units.resize(self.width(), String::new());
         if let Some(own) = self.units.get_mut(index) {
             unit.clone_into(own);
         }
     }
 
-    /// The runs of a table that stand side by side, each with its own times in its first column; else the table.
-    pub(super) fn runs(self) -> Vec<Self> {
+    /// The runs of a table that stand side by side, each with its own times in its first column; columns of other quantities with times of
+    /// their own at common times; else the table.
+    pub(super) fn runs(mut self) -> Vec<Self> {
         let is_time = |i: &usize| self.unit_of_times(*i).is_some();
         let mut begins: Vec<usize> = (0..self.headers.len()).filter(is_time).collect();
         let is_same = |i: &usize| {
@@ -228,12 +192,85 @@ impl Table {
         if begins.len() < 2 || begins[0] != 0 || begins.iter().all(is_same) {
             return vec![self];
         }
+        if self.align_columns(&begins) {
+            return vec![self];
+        }
         begins.push(self.width());
         if begins.windows(2).any(|pair| pair[1] - pair[0] < 2) {
             return vec![self];
         }
         let runs = begins.windows(2).map(|pair| self.part(pair[0]..pair[1]));
         runs.collect()
+    }
+
+    /// Brings columns with times of their own to common times, or names these; false for runs of the same quantities.
+    fn align_columns(&mut self, timers: &[usize]) -> bool {
+        let mut block = 0;
+        let mut channels = Vec::new();
+        let mut rows = self.rows();
+        for i in 0..self.width() {
+            let is_timer = timers.contains(&i);
+            let samples = &self.columns[i].samples;
+            if is_timer {
+                block += usize::from(!timers.contains(&i.wrapping_sub(1)));
+                rows = samples
+                    .iter()
+                    .rposition(|t| t.is_finite())
+                    .map_or(0, |last| last + 1);
+            }
+            let stated = self.stated_unit(i);
+            let name = split_unit(self.quantity_name(i)).0.replace('.', " ");
+            channels.push(Channel {
+                name: format!("{block}.{name}"),
+                unit: stated.text().map(str::to_owned).filter(|_| is_timer),
+                values: samples.iter().take(rows).copied().collect(),
+                ..Channel::default()
+            });
+        }
+        if own_times(&mut channels) == 0 {
+            return false;
+        }
+        let Some(note) = align(&mut channels) else {
+            for (column, channel) in self.columns.iter_mut().zip(&channels) {
+                let is_other =
+                    channel.sampling.is_some() && channel.sampling != channels[1].sampling;
+                column
+                    .unapplied
+                    .extend(is_other.then(|| "times of its own".to_owned()));
+            }
+            return true;
+        };
+        let factor = self
+            .unit_of_times(timers[0])
+            .map_or(1.0, |unit| unit.factor());
+        let first = channels.iter().find(|channel| channel.sampling.is_some());
+        let (count, sampling) = first.map_or((0, None), |channel| {
+            (channel.values.len(), channel.sampling)
+        });
+        let mut index = 0;
+        for (i, channel) in channels.into_iter().enumerate() {
+            if timers.contains(&i) && i != timers[0] {
+                // Its times are those of the first column now.
+                self.columns.remove(index);
+                self.headers.remove(index);
+                if index < self.units.len() {
+                    self.units.remove(index);
+                }
+                continue;
+            }
+            let column = &mut self.columns[index];
+            column.samples = match sampling.filter(|_| i == timers[0]) {
+                Some(sampling) => (0..count).map(|row| sampling.time(row) / factor).collect(),
+                None => channel.values,
+            };
+            column.samples.resize(count, f64::NAN);
+            column.unapplied.extend(channel.unapplied);
+            column.late = channel.late;
+            index += 1;
+        }
+        self.lines.truncate(count);
+        self.notes.push(note);
+        true
     }
 
     /// The columns of a run, as long as it has times.

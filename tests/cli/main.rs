@@ -27,6 +27,7 @@ mod reading_back;
 mod regressions;
 mod results;
 mod right_answers;
+mod right_reasons;
 mod run_folder;
 mod sequence;
 mod simulate;

@@ -17,9 +17,12 @@ fn a_run_equals_its_files() {
     let costs: Vec<f64> = run.history.iter().map(|row| row.cost).collect();
     assert_eq!(costs, read("history.csv", "cost"));
     assert_eq!(run.history.last().map(|row| row.iteration), Some(1000));
-    assert_eq!(run.coefficients.mass, read("functions.csv", "mass_kg"));
+    assert_eq!(
+        run.coefficients.inertias[0],
+        read("functions.csv", "mass_kg")
+    );
     let truth = run.truth.as_ref().expect("the truth is known");
-    assert_eq!(truth.mass, read("functions.csv", "true_mass_kg"));
+    assert_eq!(truth.inertias[0], read("functions.csv", "true_mass_kg"));
     assert_eq!(
         run.trajectory.column("y_m"),
         Some(read("trajectory.csv", "y_m"))
@@ -46,9 +49,10 @@ fn bands() {
     );
     let run = Run::open(bench.path("run")).expect("a run");
     let [low, high] = run.band("mass").expect("few values");
-    let within =
-        |i: usize| low[i] <= run.coefficients.mass[i] && run.coefficients.mass[i] <= high[i];
-    assert!((0..run.coefficients.mass.len()).all(within));
+    let within = |i: usize| {
+        low[i] <= run.coefficients.inertias[0][i] && run.coefficients.inertias[0][i] <= high[i]
+    };
+    assert!((0..run.coefficients.inertias[0].len()).all(within));
     assert!(run.band("k/m").is_some() && run.band("friction").is_none());
 }
 

@@ -322,10 +322,7 @@ pub fn run(bytes: &[u8]) -> Verdict {
     match opened {
         Err(error) => told(&error),
         Ok(run) => {
-            let state = State {
-                displacement: 1.0,
-                velocity: 0.0,
-            };
+            let state = State::one(1.0, 0.0);
             let _ = predict(&run.system, &run.coefficients, run.truth.as_ref(), &[state]);
             run.band("mass");
             Verdict::Accepted

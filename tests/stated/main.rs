@@ -4,6 +4,7 @@
 mod clocks;
 mod files;
 mod headings;
+mod kinds;
 mod many_variables;
 #[path = "../common/program.rs"]
 mod program;

@@ -44,7 +44,7 @@ fn units_of_universal_files() {
     let bench = Workbench::empty();
     bench.write("r.uff", &set_58("fortnight", "g"));
     let said = bench.run_to(0, &["init", "r.uff"]);
-    assert!(said.contains("states times in `fortnight`"), "{said}");
+    assert!(said.contains("fortnight, which is not applied"), "{said}");
     bench.run_to(0, &["fit", "r.yaml", "--out", "run", "--no-report"]);
     let document: serde_json::Value =
         serde_json::from_str(&bench.read("run/result.json")).expect("a document");
@@ -83,7 +83,7 @@ fn tables_of_hdf5() {
     };
     let said = init("r.h5", &file(AttrValue::String("g".into())), &[]);
     assert!(
-        said.contains("`run.acc.2`: acceleration") && said.contains("the unit g of a table"),
+        said.contains("`run.acc.2`: acceleration, g") && said.contains("`run.time`: time, s"),
         "{said}"
     );
     assert!(!said.contains("_i_run"), "{said}");

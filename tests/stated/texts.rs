@@ -98,7 +98,7 @@ fn units_before_the_names_are_applied_or_named() {
     }
     let text = format!("# units: s, mm, N, V\n{rows}");
     let said = init("record.csv", text.as_bytes(), &[]);
-    assert!(said.contains("the units `s, mm, N, V`"), "{said}");
+    assert!(said.contains("units = [s, mm, N, V]"), "{said}");
     // A device, and no unit of measurement.
     let said = init("record.csv", format!("# Unit: 12\n{rows}").as_bytes(), &[]);
     assert!(!said.contains("not applied"), "{said}");

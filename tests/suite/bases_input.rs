@@ -47,7 +47,7 @@ fn basis(mass: &str) -> Basis {
 /// The mass at the nodes at the start.
 fn start(mass: &str) -> Vec<f64> {
     let functions = functions(mass);
-    functions.nodal(&functions.start()).mass
+    functions.nodal(&functions.start()).inertias.swap_remove(0)
 }
 
 #[track_caller]

@@ -167,9 +167,9 @@ fn the_initial_state_of_a_long_record_is_that_of_its_beginning() {
         let [long, short] = [25_000, 20_000].map(|count| initial(count, has_velocity));
         // A sample more or less moves the weight of the smoothing, and the state by less than the noise: that of a sample, 1e-3, and that of
         // a difference of two, 1e-3 / 0.1.
-        let apart = (long.displacement - short.displacement).abs();
+        let apart = (long.displacement(0) - short.displacement(0)).abs();
         assert!(apart < 1e-3, "{long:?} {short:?}");
-        let apart = (long.velocity - short.velocity).abs();
+        let apart = (long.velocity(0) - short.velocity(0)).abs();
         assert!(apart < 1e-2, "{long:?} {short:?}");
     }
 }

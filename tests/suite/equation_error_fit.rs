@@ -11,18 +11,13 @@ use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit,
 };
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
-
-const REST: State = State {
-    displacement: 0.0,
-    velocity: 0.0,
-};
 
 fn settings() -> FitSettings {
     FitSettings {
@@ -47,7 +42,7 @@ fn system() -> System {
     System {
         grid: Grid::new(0.0, 60.0, NODES).unwrap(),
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
@@ -79,7 +74,9 @@ fn sample_table(
 ) -> Channel {
     let grid = &system.grid;
     let excitation = Some(excitation);
-    let motion = system.forward(device, REST, excitation).unwrap();
+    let motion = system
+        .forward(device, &State::one(0.0, 0.0), excitation)
+        .unwrap();
     let view = SimulatedRecord {
         system,
         nodal: device,
@@ -143,7 +140,7 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
         .map(|t| base * (1.0 + 0.25 * (TAU * t / 15.0).sin()))
         .collect();
     let device = NodalCoefficients {
-        mass: vec![1.0; NODES],
+        inertias: vec![vec![1.0; NODES]],
         coefficients: vec![vec![0.005 * 2.0 * base.sqrt(); NODES], k.clone()],
     };
     let excitation = Excitation {
@@ -151,7 +148,7 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
         base: None,
     };
     let channel = sample_table(&system, &device, &excitation, ChannelKind::Acceleration);
-    let experiment = Experiment::free("shaken", REST, NODES).with_channel(channel);
+    let experiment = Experiment::free("shaken", State::one(0.0, 0.0), NODES).with_channel(channel);
     (problem_of(system, list, experiment), k)
 }
 
@@ -204,11 +201,11 @@ fn close(found: &[f64], expected: &[f64], within: f64) {
 fn driven(kind: ChannelKind, excitation: Excitation, mass: Option<f64>) -> Problem {
     let system = system();
     let device = NodalCoefficients {
-        mass: vec![2.0; NODES],
+        inertias: vec![vec![2.0; NODES]],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
     let channel = sample_table(&system, &device, &excitation, kind);
-    let experiment = Experiment::free("driven", REST, NODES)
+    let experiment = Experiment::free("driven", State::one(0.0, 0.0), NODES)
         .with_excitation(excitation)
         .with_channel(channel);
     problem_of(system, constants(mass), experiment)
@@ -341,10 +338,7 @@ fn the_cost_is_the_integral_of_the_squared_error() {
         let observed: Vec<f64> = (0..=100).map(|i| (spacing * f64::from(i)).cos()).collect();
         let weighting = Weighting::Integral { spacing };
         let channel = Channel::displacement_at_nodes(observed, stride, weighting, &grid);
-        let initial = State {
-            displacement: 1.0,
-            velocity: 0.0,
-        };
+        let initial = State::one(1.0, 0.0);
         let list = vec![
             CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
             CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.0; nodes]),

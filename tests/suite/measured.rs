@@ -102,7 +102,7 @@ fn the_roll_decay_with_nonlinear_damping() {
     assert!(rms <= 0.026, "{rms}");
     let device = &run.best.evaluation.nodal;
     let [linear, _, _, quadratic] = [0, 1, 2, 3].map(|j| device.coefficients[j][0]);
-    let inertia = device.mass[0];
+    let inertia = device.inertias[0][0];
     assert!((inertia / 135.75 - 1.0).abs() <= 0.01, "{inertia}");
     let omega = (821.96 / inertia).sqrt();
     let amplitude = 5f64.to_radians();

@@ -128,7 +128,7 @@ fn all_rows_and_the_optimum_follow_the_shared_reference() {
     let optimum = common::csv(&folder.join("paper_optimum.csv"));
     let device = &run.best.evaluation.nodal;
     for (i, row) in optimum.iter().enumerate() {
-        assert!((device.mass[i] - row[1]).abs() < 1e-9);
+        assert!((device.inertias[0][i] - row[1]).abs() < 1e-9);
         assert!((device.coefficients[1][i] - row[2]).abs() < 1e-9);
         assert!((device.coefficients[0][i] - row[3]).abs() < 1e-9);
     }
@@ -179,10 +179,7 @@ fn the_paper_s_optimum_does_not_predict() {
     let system: System = common::system(2000, kmcfit_core::internals::system::Method::Midpoint);
     let states: Vec<State> = expected
         .iter()
-        .map(|&(displacement, velocity, ..)| State {
-            displacement,
-            velocity,
-        })
+        .map(|&(displacement, velocity, ..)| State::one(displacement, velocity))
         .collect();
     let truth = common::paper_system(2000);
     let device = &paper_run().best.evaluation.nodal;

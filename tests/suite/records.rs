@@ -3,7 +3,7 @@
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
@@ -27,13 +27,13 @@ fn motion(
     let nodes = FINE * (count - 1) + 1;
     let grid = Grid::new(0.0, (count - 1) as f64 / rate, nodes).unwrap();
     let device = NodalCoefficients {
-        mass: vec![MASS; nodes],
+        inertias: vec![vec![MASS; nodes]],
         coefficients: vec![vec![DAMPING; nodes], vec![STIFFNESS; nodes]],
     };
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     // The right end of a step is evaluated just before a jump at the node.
     let steps = |f: &dyn Fn(f64) -> f64| {
@@ -48,11 +48,10 @@ fn motion(
         force: Some(steps(force)),
         base: Some(steps(base)),
     };
-    let initial = State {
-        displacement: 0.02,
-        velocity: 0.0,
-    };
-    let motion = system.forward(&device, initial, Some(&excitation)).unwrap();
+    let initial = State::one(0.02, 0.0);
+    let motion = system
+        .forward(&device, &initial, Some(&excitation))
+        .unwrap();
     motion
         .displacement(0)
         .iter()
@@ -97,7 +96,7 @@ const KNOWN: &str = "{fixed: 1.5}";
 fn error(run: &Fit) -> f64 {
     let device = &run.best.evaluation.nodal;
     let found = [
-        device.mass[0],
+        device.inertias[0][0],
         device.coefficients[0][0],
         device.coefficients[1][0],
     ];

@@ -76,8 +76,8 @@ pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Extremes, Interpolation, Mobility, SecondOrder, Signal, Spectrum,
         SweepLaw, band_pass, clipped, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
-        high_pass, low_pass, median, median_spacing, onset, quantisation, spikes, two_forced_modes,
-        two_modes,
+        high_pass, is_kept_up, jumps, low_pass, median, median_spacing, onset, quantisation,
+        spikes, two_forced_modes, two_modes,
     };
 }
 pub mod simd {
@@ -103,7 +103,7 @@ pub mod solvers {
     };
 }
 pub mod structure {
-    pub use crate::structure::Law;
+    pub use crate::structure::{Law, Structure};
 }
 pub mod study {
     pub use crate::study::{

@@ -24,18 +24,18 @@
 //!
 //! ```
 //! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record, Status};
-//! use kmcfit_core::{Grid, Method, NodalCoefficients, State, System, Law};
+//! use kmcfit_core::{Grid, Law, Method, NodalCoefficients, State, Structure, System};
 //!
 //! // The system: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
 //! let grid = Grid::new(0.0, 25.0, 1001).ok_or("a grid")?;
 //! let (times, nodes) = (grid.times(), grid.nodes());
 //! let truth = NodalCoefficients {
-//!     mass: times.iter().map(|t| 1.0 - t / 50.0).collect(),
+//!     inertias: vec![times.iter().map(|t| 1.0 - t / 50.0).collect()],
 //!     coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
 //! };
-//! let terms = vec![Law::Damping, Law::Stiffness];
-//! let system = System { grid, method: Method::Rk4, terms };
-//! let response = system.forward(&truth, State { displacement: 3.3, velocity: 1.0 }, None)?;
+//! let structure = Structure::one(vec![Law::Damping, Law::Stiffness]);
+//! let system = System { grid, method: Method::Rk4, structure };
+//! let response = system.forward(&truth, &State::one(3.3, 1.0), None)?;
 //!
 //! // Estimated: a line for the mass and a constant damping; the stiffness is known.
 //! let mass = CoefficientSpec::polynomial(&[2.0, 0.0]);
@@ -46,7 +46,7 @@
 //!
 //! assert_eq!(fit.outcome.status, Status::Converged);
 //! let mass = problem.coefficient(CoefficientKind::Mass, &fit.best.parameters).ok_or("a mass")?;
-//! let error = mass.iter().zip(&truth.mass).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
+//! let error = mass.iter().zip(&truth.inertias[0]).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
 //! assert!(error < 1e-9, "{error}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -71,6 +71,7 @@ mod problem;
 mod qp;
 mod record;
 mod rows;
+mod scalar_search;
 mod signal;
 mod simd;
 mod solvers;

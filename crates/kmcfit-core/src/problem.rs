@@ -112,7 +112,7 @@ impl ProblemParts {
         if functions != grid {
             return Err(ProblemError::Nodes { functions, grid });
         }
-        let terms = self.system.terms.len();
+        let terms = self.system.laws().len();
         for found in self
             .functions
             .coefficient_sets()
@@ -164,7 +164,9 @@ impl ProblemParts {
     fn mismatch(&self, record: &Experiment) -> Option<&'static str> {
         let scalars = self.functions.scalars().len();
         let sensors = record.channels.iter().flat_map(|c| c.sensor().indices());
-        let mut indices = sensors.chain(record.initial_parameters).flatten();
+        let mut indices = sensors
+            .chain(record.initial_parameters.iter().copied())
+            .flatten();
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
         match () {
@@ -420,7 +422,7 @@ mod tests {
         let mut copy = problem.clone();
         copy.start_from(&[3.0, 1.0, 0.0]);
         assert_eq!(estimated(&copy, &[]), 0);
-        copy.parts_mut().experiments[0].initial.displacement = 0.5;
+        copy.parts_mut().experiments[0].initial.components_mut()[0] = 0.5;
         assert_eq!(estimated(&copy, &[]), 1);
         assert_eq!(estimated(&problem, &[]), 0);
         let changed = problem.with(|parts| parts.jumps.clear());

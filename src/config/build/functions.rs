@@ -531,7 +531,7 @@ pub(super) fn truth(
     let mut list = shared(file).into_iter();
     let mass = list.next().map(&column).transpose()?.unwrap_or_default();
     Ok(Some(NodalCoefficients {
-        mass,
+        inertias: vec![mass],
         coefficients: list.map(&column).collect::<Result<_, _>>()?,
     }))
 }

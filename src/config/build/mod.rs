@@ -79,6 +79,20 @@ pub struct Model {
     pub preparation: Preparation,
 }
 
+impl Model {
+    /// True where an unmeasured force keeps up the motion of all records, by a warning about each.
+    pub fn is_kept_up(&self) -> bool {
+        let mut experiments = self.problem.experiments.iter();
+        experiments.all(|experiment| {
+            self.warnings.iter().any(|warning| {
+                let of = warning.quantities.get("experiment");
+                warning.kind == "unmeasured_force"
+                    && of.and_then(|name| name.as_str()) == Some(&experiment.name)
+            })
+        })
+    }
+}
+
 /// Wall-clock time taken to build a model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Preparation {
@@ -305,10 +319,7 @@ fn build_on(
         .enumerate()
         .partition(|(i, _)| validation(i));
     let truth = timed(&mut reading, || functions::truth(file, &grid))?;
-    let state = |s: &super::spec::StateSpec| State {
-        displacement: s.displacement.0,
-        velocity: s.velocity.0,
-    };
+    let state = |s: &super::spec::StateSpec| State::one(s.displacement.0, s.velocity.0);
     let study = study::build(file, &built.problem)?;
     let source = source.unwrap_or_else(|| timed(&mut reading, || ModelSource::of(file)));
     Ok(Model {

@@ -337,10 +337,7 @@ fn candidate(
 ) -> Result<Experiment, InputError> {
     let grid = &problem.system.grid;
     let nodes = grid.nodes();
-    let initial = State {
-        displacement: spec.initial.displacement.0,
-        velocity: spec.initial.velocity.0,
-    };
+    let initial = State::one(spec.initial.displacement.0, spec.initial.velocity.0);
     let mut experiment = Experiment::free(spec.name.0.clone(), initial, nodes);
     if let Some(force) = &spec.force {
         let force = Some(Waveform::Shape(experiments::shape(file, key, force)?));

@@ -113,10 +113,10 @@ impl ColumnAssignment {
             }
             columns.used.push(time(table, &numeric, &known)?);
         }
-        // Voltages stand for a response only where no other column does.
+        // Voltages stand for a quantity only where no other column does.
         let rank = |index: &usize| {
             let found = known(table, *index).filter(|column| !column.is_stated);
-            found.is_some_and(|column| column.unit.is_arbitrary() && column.role.is_channel())
+            found.is_some_and(|column| column.unit.is_arbitrary())
         };
         let (volts, others): (Vec<usize>, Vec<usize>) = numeric.into_iter().partition(rank);
         for index in others.into_iter().chain(volts) {
@@ -124,7 +124,11 @@ impl ColumnAssignment {
                 continue;
             }
             match known(table, index) {
-                Some(_) if rank(&index) && columns.has_mechanical_channel() => {
+                Some(column)
+                    if rank(&index)
+                        && column.role.is_channel()
+                        && columns.has_mechanical_channel() =>
+                {
                     columns.unused.push(index);
                 }
                 Some(column) if column.role != Role::Time => columns.take(table, column)?,

@@ -2,7 +2,6 @@
 //!
 //! Columns are assigned by options, then by units, then by names. Where nothing determines the mass, the model states that it is unknown.
 
-mod codes;
 mod columns;
 mod functions;
 mod record_summary;
@@ -13,7 +12,7 @@ mod statements;
 use crate::error::InputError;
 use crate::memory;
 use crate::number_format::significant;
-use crate::tables::{Table, TableFormat};
+use crate::tables::{self, Table, TableFormat};
 use crate::text_io::{listed, quote};
 pub(super) use columns::ColumnAssignment;
 pub use columns::{rate, recognised};
@@ -87,7 +86,7 @@ fn read<'a>(
                 true => used,
                 false => is_used.iter().zip(used).map(|(a, b)| *a || b).collect(),
             };
-            let codes = codes::codes(&table, columns.measured());
+            let codes = tables::codes(&table, columns.measured());
             let summary = RecordSummary::of(&table, &columns, &codes)?;
             records.push(FileRecord {
                 source,
@@ -127,6 +126,12 @@ fn findings(record: &FileRecord) -> Vec<String> {
     if let Some(begins) = summary.begins {
         found.push(format!("at rest before {begins} s: excluded by `window`"));
     }
+    if summary.is_kept_up {
+        found.push(
+            "no force is measured and the motion does not decay: the record gives the natural frequency alone"
+                .to_owned(),
+        );
+    }
     if let Some([from, to]) = summary.known {
         found.push(format!(
             "the input has missing values; {from} to {to} s is the longest part without: chosen by `window`"
@@ -144,6 +149,9 @@ fn findings(record: &FileRecord) -> Vec<String> {
     if !others.is_empty() {
         let others = listed(others.iter().map(String::as_str));
         found.push(format!("not used, of another length or rate: {others}"));
+    }
+    for other in table.unusable() {
+        found.push(format!("not usable: `{}`, {}", other.name, other.content));
     }
     if let Some(lines) = &summary.repeated {
         found.push(format!(
@@ -233,7 +241,11 @@ fn text(records: &[FileRecord], statements: &Statements) -> String {
             quoted(&name),
             quoted(&record.source.name)
         );
-        for (key, value, comment) in keys(record) {
+        // The functions are shared: all records begin at the same time.
+        let others = records
+            .iter()
+            .any(|other| other.summary.from != records[0].summary.from);
+        for (key, value, comment) in keys(record, others) {
             if let Some(value) = value {
                 text += &commented(&format!("{key}: {value}"), &comment);
             }
@@ -248,10 +260,16 @@ fn text(records: &[FileRecord], statements: &Statements) -> String {
             "# truth: {data: truth.csv}",
             "the true functions, where they are known",
         )
-        + &commented(
-            "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}",
-            "",
-        )
+        + &match records.iter().all(|record| record.summary.is_kept_up) {
+            true => commented(
+                "fit: {method: equation-error}",
+                "no force is measured and none of the motion decays: the natural frequency alone follows",
+            ),
+            false => commented(
+                "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}",
+                "",
+            ),
+        }
 }
 
 /// Name of a file without its extension.
@@ -269,14 +287,20 @@ fn keys(
         codes,
         ..
     }: &FileRecord,
+    begins_at_zero: bool,
 ) -> Vec<(&'static str, Option<String>, String)> {
     let sigmas: Vec<String> = (columns.channels())
         .map(|role| format!("{}: estimate", role.key()))
         .collect();
     let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
-    let between = format!("{{interpolation: {}}}", record.between);
+    let between = |between: &str| Some(format!("{{interpolation: {between}}}"));
     let or = "between samples: or hold, linear, cubic";
-    let (sensors, why) = sensors(columns, table, record);
+    // A displacement is differentiated twice.
+    let (of_base, or_base) = match columns.has(Role::BaseDisplacement) {
+        true => ("cubic", "between samples"),
+        false => (record.between, or),
+    };
+    let (sensors, why) = sensors(columns, table, record, codes);
     let repeated = record.repeated.as_deref().unwrap_or_default();
     let repeated = format!("times are repeated in {repeated}; or `mean`");
     let robust = format!("{{{}: huber}}", record.channel.0.key());
@@ -321,11 +345,16 @@ fn keys(
             "s; the longest part in which no value of the input is missing",
         ),
         (
+            "    time_zero",
+            begins_at_zero.then(|| format!("{:?}", record.from)),
+            "s; this time of the file becomes 0, as all records share the functions",
+        ),
+        (
             "    force",
-            columns.has(Role::Force).then(|| between.clone()),
+            between(record.between).filter(|_| columns.has(Role::Force)),
             or,
         ),
-        ("    base", has_base.then_some(between), or),
+        ("    base", between(of_base).filter(|_| has_base), or_base),
         (
             "    sigma",
             Some(format!("{{{}}}", sigmas.join(", "))),

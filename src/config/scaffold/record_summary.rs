@@ -7,7 +7,7 @@ use crate::config::build::known_stretches;
 use crate::config::dominant::{Oscillation, remove_outliers, values_of};
 use crate::error::InputError;
 use crate::tables::{Duplicates, RepeatedTimes, Table, lines_in_words, repeated_times};
-use kmcfit_core::internals::signal::{median, onset};
+use kmcfit_core::internals::signal::{is_kept_up, jumps, median, onset};
 use kmcfit_core::internals::system::round_time;
 
 /// Most lines in a comment.
@@ -16,8 +16,6 @@ const LISTED: usize = 10;
 const FEWEST: usize = 8;
 /// Relative difference below which spacings are equal up to rounded times.
 const REGULAR: f64 = 0.05;
-/// An excitation that changes at less than this share of its samples is piecewise constant.
-const MOST_JUMPS: f64 = 0.1;
 
 /// Summary of a record.
 #[derive(Debug)]
@@ -26,6 +24,8 @@ pub struct RecordSummary {
     pub missing: usize,
     /// Lines that repeat a time with other values, in words.
     pub repeated: Option<String>,
+    /// First time used, s.
+    pub from: f64,
     /// s.
     pub duration: f64,
     /// Median sampling interval, s.
@@ -43,6 +43,8 @@ pub struct RecordSummary {
     pub frequency: Option<f64>,
     /// True if the samples drift along a straight line.
     pub drifts: bool,
+    /// True where no input is measured and a force keeps up the motion.
+    pub is_kept_up: bool,
     /// Interpolation of force and base motion between samples.
     pub between: &'static str,
 }
@@ -88,8 +90,9 @@ impl RecordSummary {
         let pairs = &pairs[begins.unwrap_or(0)..];
         let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
         let oscillation = Oscillation::of(pairs, spacing, duration);
+        let is_regular = (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing);
         Ok(Self {
-            between: between(&input.unwrap_or_default()),
+            between: between(input.as_deref().unwrap_or_default()),
             samples: pairs.len(),
             missing,
             repeated: (!repeated.are_equal).then(|| {
@@ -100,9 +103,11 @@ impl RecordSummary {
             outliers,
             begins: begins.map(|_| round_time(pairs[0].0, spacing)),
             known,
+            from: round_time(begins.map_or(times[0], |_| pairs[0].0), spacing),
             duration,
             spacing,
-            is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
+            is_kept_up: input.is_none() && is_regular && is_kept_up(&values_of(pairs), spacing),
+            is_regular,
             frequency: oscillation.frequency,
             drifts: oscillation.drifts,
         })
@@ -146,11 +151,7 @@ fn moving(table: &Table, times: &[f64], values: &[f64]) -> Result<Vec<(f64, f64)
 
 /// Interpolation that predicts every second sample of an excitation best from the others.
 fn between(input: &[f64]) -> &'static str {
-    let steps: Vec<bool> = input.windows(2).map(|pair| pair[0] != pair[1]).collect();
-    let jumps = steps.iter().filter(|moves| **moves).count();
-    let run = steps.windows(2).filter(|pair| pair[0] && pair[1]).count();
-    // A hammer impact extends over several samples.
-    if jumps > 0 && run == 0 && (jumps as f64) < MOST_JUMPS * input.len() as f64 {
+    if !jumps(input).is_empty() {
         return "hold";
     }
     let (mut line, mut cubic) = (0.0, 0.0);

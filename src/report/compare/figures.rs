@@ -27,7 +27,7 @@ type Quantity = (
 );
 
 const QUANTITIES: [Quantity; 5] = [
-    ("mass m", "kg", |d| d.mass.clone()),
+    ("mass m", "kg", |d| d.inertias[0].clone()),
     ("damping c", "N s/m", |d| d.coefficients[0].clone()),
     ("stiffness k", "N/m", |d| d.coefficients[1].clone()),
     ("k/m", "s⁻²", |d| Ratios::of(d).k_over_m),

@@ -115,7 +115,7 @@ fn bands(run: &Run, states: &[State]) -> Vec<Option<Vec<[f64; 2]>>> {
             &grid,
             nodes,
         )?;
-        let mut experiment = Experiment::free("prediction", *state, nodes);
+        let mut experiment = Experiment::free("prediction", state.clone(), nodes);
         experiment.channels.push(channel);
         let problem = identified.problem(grid, experiment)?;
         let predicted = identified.predict(&problem, &[None]).ok()?;

@@ -84,7 +84,8 @@ impl ForcedPredictions {
         let grid = grid(run, &system, record)?;
         let mut cases = Vec::new();
         for state in states {
-            let (experiment, is_measured) = experiment(&system, record, *state, kinds, &grid)?;
+            let (experiment, is_measured) =
+                experiment(&system, record, state.clone(), kinds, &grid)?;
             let sigmas: Vec<Option<f64>> = (experiment.channels.iter())
                 .map(|channel| system.sigma(channel.kind()))
                 .collect();
@@ -102,7 +103,7 @@ impl ForcedPredictions {
             match system.identified.predict(&problem, &sigmas) {
                 Err(breakdown) => return Ok(Err(format!("no response: {breakdown}"))),
                 Ok(channels) => cases.push(Case {
-                    initial: *state,
+                    initial: state.clone(),
                     channels,
                     is_measured,
                 }),
@@ -118,7 +119,9 @@ impl ForcedPredictions {
     pub fn summaries(&self) -> Vec<ForcedSummary> {
         let each = self.cases.iter().flat_map(|case| {
             let channels = case.channels.iter().zip(&case.is_measured);
-            channels.map(|(channel, is_measured)| self.summary(case.initial, channel, *is_measured))
+            channels.map(|(channel, is_measured)| {
+                self.summary(case.initial.clone(), channel, *is_measured)
+            })
         });
         each.collect()
     }
@@ -135,8 +138,8 @@ impl ForcedPredictions {
             largest(&halves)
         });
         ForcedSummary {
-            displacement: initial.displacement,
-            velocity: initial.velocity,
+            displacement: initial.displacement(0),
+            velocity: initial.velocity(0),
             channel: channel.channel.kind().name(),
             unit: channel.channel.kind().unit_of(self.is_rotation),
             samples: channel.values.len(),
@@ -246,7 +249,9 @@ impl ForcedPredictions {
     pub fn figure(&self) -> Figure {
         let panels = self.cases.iter().flat_map(|case| {
             let channels = case.channels.iter().zip(&case.is_measured);
-            channels.map(|(channel, is_measured)| self.panel(case.initial, channel, *is_measured))
+            channels.map(|(channel, is_measured)| {
+                self.panel(case.initial.clone(), channel, *is_measured)
+            })
         });
         Figure::new(
             "predictions",
@@ -265,7 +270,8 @@ impl ForcedPredictions {
         )
         .title(format!(
             "from y = {}, v = {}",
-            initial.displacement, initial.velocity
+            initial.displacement(0),
+            initial.velocity(0)
         ));
         let bands = [
             ("95 % of samples", channel.sample_band(), Colour::Grey),

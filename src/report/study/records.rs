@@ -122,13 +122,13 @@ pub fn candidates(at: Optimum, list: &[Experiment]) -> Vec<CandidateRecord> {
 /// Equivalent systems: other coefficients with the response of the fit.
 pub fn equivalent(at: Optimum, asked: &[Choice]) -> Vec<EquivalentSystemRecord> {
     let record = |found: EquivalentSystem| {
-        let mut coefficients = found.nodal.coefficients.into_iter();
+        let mut functions = found.nodal.functions().map(<[f64]>::to_vec);
         EquivalentSystemRecord {
             name: found.name,
             times: at.problem.system.grid.times(),
-            mass: found.nodal.mass,
-            damping: coefficients.next().unwrap_or_default(),
-            stiffness: coefficients.next().unwrap_or_default(),
+            mass: functions.next().unwrap_or_default(),
+            damping: functions.next().unwrap_or_default(),
+            stiffness: functions.next().unwrap_or_default(),
             response_error: found.response_error,
         }
     };
@@ -207,8 +207,8 @@ pub fn extremes(
 fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<PredictionRecord> {
     let covariance = at.problem.covariance_of_estimates(at.theta, at.evaluation);
     let free = model.predictions.iter().map(|state| {
-        let (y, v) = (state.displacement, state.velocity);
-        prediction::PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), *state)
+        let (y, v) = (state.displacement(0), state.velocity(0));
+        prediction::PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), state.clone())
     });
     let candidates = model
         .study
@@ -216,7 +216,7 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
         .iter()
         .map(|c| prediction::PredictionCase {
             excitation: c.excitation.clone(),
-            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.initial)
+            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.initial.clone())
         });
     let each = free.chain(candidates).filter_map(|run| {
         let covariance = covariance.as_ref();

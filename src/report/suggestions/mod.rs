@@ -12,7 +12,7 @@ use kmcfit_core::internals::assessment::{EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::functions::{CoefficientKind, ScalarValue};
 use kmcfit_core::internals::record::{BaseMotion, Waveform};
-use kmcfit_core::internals::signal::Interpolation;
+use kmcfit_core::internals::signal::{Interpolation, Signal};
 use kmcfit_core::internals::solvers::{FEW_PARAMETERS, Solver, StartStrategy, Status};
 use residuals::{about_misfit, about_patterns};
 use serde::Deserialize;
@@ -109,6 +109,10 @@ impl Suggestion {
 /// The suggestions of a document of a fit of the model, most urgent first.
 pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> {
     let mut steps = Vec::new();
+    if let Some(codes) = about_codes(model) {
+        // They spoil all else.
+        return vec![codes];
+    }
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
     steps.extend(about_records(document, model));
@@ -127,8 +131,15 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     steps.extend(about_misfit(document, model));
     steps.extend(about_constants(document));
     steps.extend(about_rank(document));
-    let in_file = steps.into_iter().map(|step| step.in_file(&model.places));
-    in_file.collect()
+    let mut in_file: Vec<Suggestion> = Vec::new();
+    for step in steps.into_iter().map(|step| step.in_file(&model.places)) {
+        // Several findings may ask for one change.
+        let is_new = |known: &Suggestion| known.step != step.step || step.step == Step::Outside;
+        if in_file.iter().all(is_new) {
+            in_file.push(step);
+        }
+    }
+    in_file
 }
 
 /// The suggestions as advice without trials, where the model file is not at hand.
@@ -175,6 +186,25 @@ fn text_of(warning: &Finding, key: &str) -> Option<String> {
 
 fn number_of(warning: &Finding, key: &str) -> Option<f64> {
     warning.quantities.get(key)?.as_f64()
+}
+
+/// Statement of the codes that stand for missing samples.
+fn about_codes(model: &Model) -> Option<Suggestion> {
+    let found = model.warnings.iter().filter(|w| w.kind == "missing_codes");
+    let overrides = found.filter_map(|warning| {
+        let name = text_of(warning, "experiment")?;
+        let mut experiments = model.problem.experiments.iter();
+        let i = model
+            .places
+            .get(experiments.position(|e| e.name == name)?)?;
+        let codes = warning.quantities.get("codes")?;
+        Some(format!("experiments.{i}.missing={codes}"))
+    });
+    let overrides: Vec<String> = overrides.collect();
+    (!overrides.is_empty()).then(|| {
+        let what = "state the values that stand for missing samples";
+        Suggestion::change("missing_codes", what, overrides)
+    })
 }
 
 fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
@@ -260,6 +290,16 @@ fn changed_gain(model: &Model, i: usize, channel: &str, factor: f64) -> String {
     format!("experiments.{i}.sensors.{channel}.gain={gain}")
 }
 
+/// The measured input of an experiment, with its key in a model file.
+fn sampled_input(model: &Model, i: usize) -> Option<(&'static str, &Signal)> {
+    let input = &model.problem.experiments[i].input;
+    match (&input.force, &input.base) {
+        (Some(Waveform::Samples(signal)), _) => Some(("force", signal)),
+        (_, Some(BaseMotion::Acceleration(signal))) => Some(("base", signal)),
+        _ => None,
+    }
+}
+
 /// Correction of an error of a record.
 fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
     document.fit_warnings().find_map(|warning| {
@@ -307,6 +347,17 @@ fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion>
                     format!("{}: {words}", record.name),
                     vec![format!("experiments.{i}.{change}")],
                 ))
+            }
+            "input_jump" => {
+                let i = place(document, &experiment?)?;
+                let (part, signal) = sampled_input(model, i)?;
+                (signal.interpolation() != Interpolation::Hold).then(|| {
+                    Suggestion::change(
+                        "hold_input",
+                        "hold each value of the input until the next",
+                        vec![format!("experiments.{i}.{part}.interpolation=hold")],
+                    )
+                })
             }
             "clock_difference" => Some(Suggestion::untried(
                 "scale_times",
@@ -369,14 +420,15 @@ fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
 /// Noise of the sensor of an input, with cubics where lines connect its samples, as these lose a share of it.
 fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
     let disturbed = document.fit_warning("disturbed_input")?;
+    let is_held = |signal: &Signal| signal.interpolation() == Interpolation::Hold;
+    if let Some(jump) = document.fit_warning("input_jump") {
+        let i = place(document, &text_of(jump, "experiment")?)?;
+        // The jump explains the disturbance.
+        is_held(sampled_input(model, i)?.1).then_some(())?;
+    }
     let i = place(document, &text_of(disturbed, "experiment")?)?;
     let (name, sigma) = (text_of(disturbed, "input")?, number_of(disturbed, "sigma")?);
-    let input = &model.problem.experiments[i].input;
-    let (part, signal) = match (&input.force, &input.base) {
-        (Some(Waveform::Samples(signal)), _) => ("force", signal),
-        (_, Some(BaseMotion::Acceleration(signal))) => ("base", signal),
-        _ => return None,
-    };
+    let (part, signal) = sampled_input(model, i)?;
     let is_linear = signal.interpolation() == Interpolation::Linear;
     let cubics = is_linear.then(|| format!("experiments.{i}.{part}.interpolation=cubic"));
     let noise = format!(

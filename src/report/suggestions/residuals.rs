@@ -5,8 +5,7 @@ use crate::config::Model;
 use crate::number_format::{significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
-use kmcfit_core::internals::diagnostics::{SIGNIFICANCE, standard_deviation};
-use kmcfit_core::internals::record::Channel;
+use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::solvers::StartStrategy;
 
 /// Residuals with a lower probability under white noise have a pattern.
@@ -133,21 +132,6 @@ pub(super) fn about_misfit(document: &ResultDocument, model: &Model) -> Vec<Sugg
     of_record(document, i, record, model)
 }
 
-/// Root mean square of the last quarter of a channel, as a share of that of the first, below which a record is a decay.
-const DECAYED: f64 = 0.5;
-
-/// True for a record whose motion decays in all channels: no force acts that lasts.
-fn is_decay(model: &Model, i: usize) -> bool {
-    let channels = model.problem.experiments.get(i).map(|e| e.channels.iter());
-    let decays = |channel: &Channel| {
-        let values = channel.observed();
-        let quarter = values.len() / 4;
-        let spread = |part: &[f64]| standard_deviation(part);
-        spread(&values[values.len() - quarter..]) < DECAYED * spread(&values[..quarter])
-    };
-    channels.is_some_and(|mut channels| channels.all(decays))
-}
-
 fn is_coloured(channel: &ChannelSummary) -> bool {
     channel.sigma.is_some()
         && channel.fit_percent < EXACT
@@ -199,7 +183,7 @@ fn of_record(
     }
     let Some(drive) = record.driven_by.first() else {
         let worst = (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
-        if worst < HARDLY && document.is_simulated() && !is_decay(model, i) {
+        if worst < HARDLY && document.is_simulated() && model.is_kept_up() {
             steps.push(Suggestion::change(
                 "equation_of_motion",
                 "if an unmeasured force acts, fit the equation of motion",

@@ -32,6 +32,8 @@ const SHARED: f64 = std::f64::consts::SQRT_2;
 const RESOLVED: f64 = 15.0;
 /// Frequency spacings by which leakage widens a half-power width at most: measured on records whose segments are shorter than the decay.
 const WINDOW: f64 = 6.0;
+/// Part of a record, as its inverse, over which coefficients are taken at its ends.
+const ENDS: usize = 6;
 
 /// Method of a classical estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,8 +65,9 @@ pub struct ClassicalEstimate {
 }
 
 /// Classical estimate from the first channel of the first experiment that allows one, for a linear model; of a forced response with constant
-/// coefficients only. Beside coefficients that vary the frequency alone is compared, with its range over the record: the amplitude of a decay
-/// also changes with mass and stiffness.
+/// coefficients only. It agrees where it differs from the estimates by at most the half widths of both intervals, as errors that are independent.
+/// Beside coefficients that vary their range over the record counts, and the change of the amplitude of a slow decay with the natural frequency,
+/// `omega^(-1/2)`, to half of its size.
 pub(super) fn classical_estimate(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -73,7 +76,7 @@ pub(super) fn classical_estimate(
     let functions = &problem.functions;
     let set = functions.coefficient_set(0);
     let is_constant = set.iter().all(|f| functions.is_constant_or_known(*f));
-    let is_linear = problem.system.terms == [Law::Damping, Law::Stiffness];
+    let is_linear = problem.system.laws() == [Law::Damping, Law::Stiffness];
     let ratios = Ratios::of(&evaluation.nodal);
     is_linear.then_some(())?;
     let is_steady = |values: &[f64]| values.iter().all(|v| *v == values[0]);
@@ -97,14 +100,29 @@ pub(super) fn classical_estimate(
         let [low, high] = interval.unwrap_or(range);
         [low.min(range[0]), high.max(range[1])]
     };
-    let overlap = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a <= d && c <= b;
+    let is_near =
+        |[a, b]: [f64; 2], [c, d]: [f64; 2]| (a + b - c - d).abs() <= (b - a).hypot(d - c);
     let frequency = interval("natural frequency", &ratios.frequency);
-    let damping = interval("damping ratio", &ratios.damping_ratio);
-    found.agrees = overlap(found.frequency_interval, frequency)
+    let [low, high] = interval("damping ratio", &ratios.damping_ratio);
+    let adiabatic = adiabatic_ratio(evaluation, problem.system.grid.duration());
+    let margin = 0.5 * adiabatic.abs();
+    let damping = [low + adiabatic - margin, high + adiabatic + margin];
+    found.agrees = is_near(found.frequency_interval, frequency)
         && found
             .damping_interval
-            .is_none_or(|own| !is_constant || overlap(own, damping));
+            .is_none_or(|own| is_near(own, damping));
     Some(found)
+}
+
+/// Mean damping ratio that a change of the natural frequency over a record adds to that of a decay.
+fn adiabatic_ratio(evaluation: &Evaluation, duration: f64) -> f64 {
+    let frequency = Ratios::of(&evaluation.nodal).frequency;
+    let part = (frequency.len() / ENDS).max(1);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let at = |from: usize| mean(&frequency[from..from + part]).ln();
+    let change = 0.5 * (at(frequency.len() - part) - at(0));
+    let ratio = change / (TAU * mean(&frequency) * duration);
+    if ratio.is_finite() { ratio } else { 0.0 }
 }
 
 fn of_experiment(experiment: &Experiment, predicted: &[f64]) -> Option<ClassicalEstimate> {
@@ -114,7 +132,14 @@ fn of_experiment(experiment: &Experiment, predicted: &[f64]) -> Option<Classical
     let spacing = even_spacing(channel.times()).filter(|_| is_plain)?;
     match (experiment.is_free(), &experiment.input.force) {
         (true, _) => {
-            let noise = rms(&channel.residuals(predicted).collect::<Vec<f64>>());
+            let residuals: Vec<f64> = channel.residuals(predicted).collect();
+            // The residuals of a poor fit are no noise.
+            let bends = channel
+                .observed()
+                .windows(3)
+                .map(|x| x[0] - 2.0 * x[1] + x[2]);
+            let rough = rms(&bends.collect::<Vec<f64>>()) / 6f64.sqrt();
+            let noise = rms(&residuals).min(rough);
             decrement(experiment, channel, spacing, noise)
         }
         (false, Some(Waveform::Samples(_))) if experiment.input.base.is_none() => {
@@ -186,11 +211,12 @@ fn decrement(
         let delta = -2.0 * fall;
         delta / (4.0 * PI * PI + delta * delta).sqrt()
     };
-    let zeta = ratio(fall);
-    let undamped = |half: f64| 0.5 / half / (1.0 - zeta * zeta).sqrt();
     // The largest of several noisy samples is too large by about the noise, relatively more at the end of the decay.
     let raised: Vec<f64> = halves.iter().map(|a| noise / a).collect();
     let [bias, _] = slope(&raised, &weights)?;
+    let fall = fall - bias;
+    let zeta = ratio(fall);
+    let undamped = |half: f64| 0.5 / half / (1.0 - zeta * zeta).sqrt();
     let margin = quantile * fall_error + bias.abs();
     let [low, high] = [-1.0, 1.0].map(|sign| ratio(fall - sign * margin));
     let [slow, fast] = [-1.0, 1.0].map(|sign| undamped(half - sign * quantile * half_error));

@@ -40,7 +40,7 @@ pub(super) fn with_functions(
 ) -> Option<Problem> {
     let changed = problem.clone().with(|parts| {
         parts.functions = functions;
-        parts.system.terms.extend(terms);
+        parts.system.structure.extend(terms);
         parts.penalties.clear();
         parts.variations.clear();
         parts.constraints = Default::default();

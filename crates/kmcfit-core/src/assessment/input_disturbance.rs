@@ -14,15 +14,18 @@
 use super::FitWarning;
 use super::input_correlation::measured;
 use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
-use crate::noise::{Correlation, InputErrors};
+use crate::noise::Correlation;
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Experiment, InputError, InputErrorKind, Loss, NoiseModel};
+use crate::scalar_search::minimum;
 use crate::simd::sum::rms;
 use crate::solvers::input_error_effect;
 
 /// Ratio of a stated sigma to the likely one, or its inverse, above which it is contradicted.
 const CONTRADICTED: f64 = 1.3;
+/// Range of that ratio in the search.
+const RATIOS: [f64; 2] = [0.1, 10.0];
 /// Quantile of chi-square with one degree of freedom, of probability 99 %: difference of `-2 log L` that noise explains.
 const SIGNIFICANT: f64 = 6.635;
 /// Difference of the criteria from which the evidence for a disturbance is very strong (Kass and Raftery 1995).
@@ -31,8 +34,8 @@ const EVIDENCE: f64 = 10.0;
 const NOISE: [f64; 2] = [1e-4, 0.5];
 /// Range of the ratio of an input's sigma to the input itself in the search.
 const SHARES: [f64; 2] = [1e-4, 1.0];
-/// Steps of the search over the logarithm of a ratio: it ends within 3 %.
-const STEPS: usize = 15;
+/// Tolerance of the logarithm of a ratio in the searches.
+const TOLERANCE: f64 = 0.01;
 /// Number of samples from the beginning of a record that are compared: an estimate from so many is certain enough.
 const MOST_SAMPLES: usize = 20_000;
 
@@ -72,15 +75,14 @@ fn contradicted(
     let count = residuals.len().min(MOST_SAMPLES);
     let sigma = channel.weighting().sigma(0)?;
     let normalised: Vec<f64> = residuals[..count].iter().map(|r| r / sigma).collect();
-    let effect = effect.first(count);
     // With the sigma of the channel as it is.
-    let minus_two_log = |ratio: f64| {
-        let errors = effect.with_sigma(ratio * effect.sigma());
-        let squares: f64 = errors.whiten(&normalised).iter().map(|e| e * e).sum();
-        squares + errors.log_determinant()
+    let minus_two_log = |log: f64| {
+        let [squares, determinant] = effect.likelihood(log.exp() * effect.ratio(), &normalised);
+        squares + determinant
     };
-    let (ratio, least) = minimum(minus_two_log, [0.1, 10.0]);
-    let is_significant = minus_two_log(1.0) - least > SIGNIFICANT;
+    let (log, least) = minimum(minus_two_log, RATIOS.map(f64::ln), TOLERANCE);
+    let ratio = log.exp();
+    let is_significant = minus_two_log(0.0) - least > SIGNIFICANT;
     let is_far = !(1.0 / CONTRADICTED..=CONTRADICTED).contains(&ratio);
     (is_significant && is_far).then(|| FitWarning::ContradictedInputSigma {
         experiment: experiment.name.clone(),
@@ -125,19 +127,18 @@ fn disturbed(
             n * mean_square(&innovations).ln() + correlation.log_determinant() + order * n.ln()
         }
     };
-    // In units of the residuals, so that ratios of sigmas are of the order of 1.
+    let effect = input_error_effect(problem, evaluation, e, channel, &error);
+    // The sigma of the channel is profiled: that of the input is the ratio times it.
     let unit = rms(residuals);
-    let effect = input_error_effect(problem, evaluation, e, channel, &error).scaled(1.0 / unit);
-    let effect: InputErrors = effect.first(count);
-    let normalised: Vec<f64> = residuals.iter().map(|r| r / unit).collect();
-    let minus_two_log = |share: f64| {
-        // The sigma of the channel is profiled: the ratio of both sigmas is the share over that of the channel.
-        let errors = effect.with_sigma(share * size);
-        n * (unit * unit * mean_square(&errors.whiten(&normalised))).ln() + errors.log_determinant()
+    let of_share = |share: f64| effect.likelihood(share * size / unit, residuals);
+    let minus_two_log = |log: f64| {
+        let [squares, determinant] = of_share(log.exp());
+        n * (squares / n).ln() + determinant
     };
-    let (share, least) = minimum(minus_two_log, SHARES);
+    let (log, least) = minimum(minus_two_log, SHARES.map(f64::ln), TOLERANCE);
+    let share = log.exp();
     let as_disturbance = least + n.ln();
-    let scale = mean_square(&effect.with_sigma(share * size).whiten(&normalised)).sqrt();
+    let scale = (of_share(share)[0] / n).sqrt() / unit;
     (as_noise - as_disturbance > EVIDENCE).then(|| FitWarning::DisturbedInput {
         experiment: experiment.name.clone(),
         input: quantity,
@@ -153,41 +154,4 @@ fn is_white(channel: &Channel, predicted: &[f64]) -> bool {
 
 fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
-}
-
-/// Minimum of a function of a positive number between two ends, by golden sections of the logarithm.
-fn minimum(value: impl Fn(f64) -> f64, ends: [f64; 2]) -> (f64, f64) {
-    let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let [mut low, mut high] = ends.map(f64::ln);
-    let mut left = high - golden * (high - low);
-    let mut right = low + golden * (high - low);
-    let (mut at_left, mut at_right) = (value(left.exp()), value(right.exp()));
-    for _ in 0..STEPS {
-        if at_left < at_right {
-            (high, right, at_right) = (right, left, at_left);
-            left = high - golden * (high - low);
-            at_left = value(left.exp());
-        } else {
-            (low, left, at_left) = (left, right, at_right);
-            right = low + golden * (high - low);
-            at_right = value(right.exp());
-        }
-    }
-    match at_left < at_right {
-        true => (left.exp(), at_left),
-        false => (right.exp(), at_right),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// 15 golden sections leave `9.2 * 0.618^15 = 0.007` of the logarithm of a range of 10^4.
-    #[test]
-    fn the_minimum_of_a_parabola_of_the_logarithm_is_found() {
-        let (place, value) = minimum(|x: f64| (x / 0.03).ln().powi(2) + 5.0, SHARES);
-        assert!((place / 0.03).ln().abs() < 0.01, "{place}");
-        assert!((value - 5.0).abs() < 1e-4);
-    }
 }

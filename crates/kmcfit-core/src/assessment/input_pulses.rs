@@ -97,12 +97,23 @@ pub(super) fn input_pulses(
 fn peaks(values: &[f64]) -> Vec<(usize, f64)> {
     let largest = values.iter().fold(0.0f64, |most, f| most.max(*f));
     let smallest = values.iter().fold(0.0f64, |least, f| least.min(*f));
+    // Noise about a force of one sign has no peak on the other side.
+    let [smallest, largest] = match largest > -smallest {
+        true => [smallest.min(-0.5 * largest), largest],
+        false => [smallest, largest.max(-0.5 * smallest)],
+    };
     let signs = values.iter().map(|f| match *f {
         f if f == largest => 1.0,
         f if f == smallest => -1.0,
         _ => 0.0,
     });
-    signs.enumerate().filter(|(_, sign)| *sign != 0.0).collect()
+    let found: Vec<(usize, f64)> = signs.enumerate().filter(|(_, sign)| *sign != 0.0).collect();
+    // A level that is held is no peak.
+    if found.len() > MOST {
+        Vec::new()
+    } else {
+        found
+    }
 }
 
 /// Values at the nodes of signals that are 1 at one of the samples and 0 at the others, as node, sample and value other than 0.

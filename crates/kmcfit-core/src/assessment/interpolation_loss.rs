@@ -89,8 +89,28 @@ fn shift_by(
     theta: &[f64],
     evaluation: &Evaluation,
     e: usize,
-    (input, signal): (InputQuantity, Signal),
+    input: (InputQuantity, Signal),
 ) -> Option<f64> {
+    let there = with_input(problem, e, input)?.evaluate(theta).ok()?;
+    let pairs = problem.predicted(evaluation);
+    let pairs = pairs.zip(there.predictions.iter().flatten());
+    let changes = pairs.map(|((_, here), there)| {
+        let both = there.iter().zip(here);
+        both.map(|(a, b)| a - b).collect()
+    });
+    let shifts = problem.shifts_by(theta, evaluation, changes.collect())?;
+    let errors = shifts
+        .into_iter()
+        .map(|[shift, error]| (shift / error).abs());
+    Some(errors.filter(|x| x.is_finite()).fold(0.0, f64::max))
+}
+
+/// The problem with this signal in place of the input of experiment `e`.
+pub(super) fn with_input(
+    problem: &Problem,
+    e: usize,
+    (input, signal): (InputQuantity, Signal),
+) -> Option<Problem> {
     let mut other = problem.clone();
     let grid = other.system.grid;
     let experiment = other.parts_mut().experiments.get_mut(e)?;
@@ -105,18 +125,7 @@ fn shift_by(
         },
     };
     experiment.excitation = Some(input.on(&grid, experiment.nodes));
-    let there = other.evaluate(theta).ok()?;
-    let pairs = problem.predicted(evaluation);
-    let pairs = pairs.zip(there.predictions.iter().flatten());
-    let changes = pairs.map(|((_, here), there)| {
-        let both = there.iter().zip(here);
-        both.map(|(a, b)| a - b).collect()
-    });
-    let shifts = problem.shifts_by(theta, evaluation, changes.collect())?;
-    let errors = shifts
-        .into_iter()
-        .map(|[shift, error]| (shift / error).abs());
-    Some(errors.filter(|x| x.is_finite()).fold(0.0, f64::max))
+    Some(other)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::structure::Law;
 
 /// Median natural frequency at the optimum, Hz; `None` without a mass and a stiffness that define one.
 pub(super) fn median_frequency(problem: &Problem, evaluation: &Evaluation) -> Option<f64> {
-    let terms = &problem.system.terms;
+    let terms = problem.system.laws();
     (terms.len() > 1 && terms[..2] == [Law::Damping, Law::Stiffness]).then_some(())?;
     let mut defined = Ratios::of(&evaluation.nodal).frequency;
     defined.retain(|f| f.is_finite());

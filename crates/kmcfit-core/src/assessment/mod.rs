@@ -12,6 +12,7 @@ mod function;
 mod implausible;
 mod input_correlation;
 mod input_disturbance;
+mod input_jumps;
 mod input_pulses;
 mod interpolation_loss;
 mod large_covariance;
@@ -58,6 +59,7 @@ pub use verdict::{SampleFault, VerdictLevel, VerdictReason, verdict_level, verdi
 
 use classical::classical_estimate;
 use friction_width::width_warning;
+use input_jumps::{connected_jump, or_jump};
 use input_pulses::input_pulses;
 use interpolation_loss::interpolation_losses;
 use record_errors::large_error;
@@ -296,8 +298,12 @@ fn causes(
     let width = is_system.then(|| width_warning(problem, theta, evaluation));
     let large = || large_error(problem, theta, evaluation).map(FitWarning::RecordError);
     let pulses = || {
-        let found = || input_pulses(problem, theta, evaluation).map(FitWarning::RecordError);
-        is_system.then(found).flatten()
+        let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
+        Some(FitWarning::RecordError(or_jump(problem, found)))
+    };
+    let jump = || {
+        let found = connected_jump(problem, theta, evaluation).filter(|_| is_system);
+        found.map(FitWarning::RecordError)
     };
     match (width.flatten(), tests) {
         (Some(width), _) => (vec![width], Vec::new()),
@@ -307,7 +313,7 @@ fn causes(
                 true => missing(problem, theta, evaluation, score_tests, is_modelled),
                 false => Default::default(),
             };
-            let found = match small.or_else(large).or_else(pulses) {
+            let found = match jump().or(small).or_else(large).or_else(pulses) {
                 Some(cause) => vec![cause],
                 None => match problem.functions.iter().all(is_constant) {
                     true => second_modes(problem, evaluation, &plausibility.residuals),

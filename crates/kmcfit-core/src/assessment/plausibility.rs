@@ -430,7 +430,7 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         let Some(force) = force.filter(|force| !force.is_zero()) else {
             continue;
         };
-        let mass = &evaluation.nodal_of(experiment.coefficient_set).mass;
+        let mass = &evaluation.nodal_of(experiment.coefficient_set).inertias[0];
         let inertia = response.velocity(0).windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {

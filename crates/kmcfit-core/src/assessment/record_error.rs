@@ -1,5 +1,6 @@
 //! Errors of a record that no parameter of the model explains.
 
+use crate::system::InputQuantity;
 use serde::Serialize;
 
 /// An error of a record.
@@ -32,6 +33,17 @@ pub enum RecordError {
         time: f64,
         /// The largest error, N: what the force lacks.
         error: f64,
+    },
+    /// The input jumps between two samples.
+    InputJump {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+        /// Times of the samples, s.
+        between: [f64; 2],
+        /// Change from one to the other, in the SI unit of the input.
+        jump: f64,
     },
     /// The input acts against its sign.
     InputSign {

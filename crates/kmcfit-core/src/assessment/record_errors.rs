@@ -192,7 +192,7 @@ fn is_reversed(problem: &Problem, evaluation: &Evaluation, e: usize) -> bool {
 /// The input of an experiment against its sign: with the samples of its channels negated the fit from the start is good.
 fn reversed_input(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<RecordError> {
     let experiment = &problem.experiments[e];
-    (!experiment.is_free() && experiment.initial_parameters == [None; 2]).then_some(())?;
+    (!experiment.is_free() && experiment.begins_known()).then_some(())?;
     let changed = problem.clone().with(|parts| {
         without_correlation(&mut parts.experiments);
         for channel in &mut parts.experiments[e].channels {

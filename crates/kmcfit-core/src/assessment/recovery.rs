@@ -41,7 +41,7 @@ impl TruthErrors {
         let (found, real) = (Ratios::of(nodal), Ratios::of(truth));
         let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
         let c_over_m = largest_error(&found.c_over_m, &real.c_over_m);
-        let mass = largest_error(&nodal.mass, &truth.mass);
+        let mass = largest_error(&nodal.inertias[0], &truth.inertias[0]);
         let stiffness_scale = largest(&real.k_over_m);
         let critical = 2.0 * stiffness_scale.sqrt();
         let relative_to_critical = largest(&real.c_over_m) < RECOVERY_TOLERANCE * critical;
@@ -56,7 +56,7 @@ impl TruthErrors {
             stiffness: largest_error(&nodal.coefficients[1], &truth.coefficients[1]),
             k_over_m,
             c_over_m,
-            mass_relative: relative(mass, largest(&truth.mass)),
+            mass_relative: relative(mass, largest(&truth.inertias[0])),
             k_over_m_relative: relative(k_over_m, stiffness_scale),
             c_over_m_relative: relative(c_over_m, damping_scale),
             relative_to_critical,
@@ -93,7 +93,7 @@ mod tests {
     fn nodal(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
         let constant = |value| vec![value; mass.len()];
         NodalCoefficients {
-            mass: mass.to_vec(),
+            inertias: vec![mass.to_vec()],
             coefficients: vec![constant(damping), constant(stiffness)],
         }
     }

@@ -3,7 +3,7 @@
 use super::plausibility::POOR;
 use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
 use crate::problem::Problem;
-use crate::record::{Experiment, NoiseEstimate};
+use crate::record::{Channel, Experiment, NoiseEstimate};
 use crate::simd::sum::rms;
 use crate::solvers::{Fit, FitSettings, Stopping, fit_from};
 
@@ -41,8 +41,7 @@ impl Refit {
 
     /// True if the residuals of all channels are white.
     pub(super) fn is_white(&self) -> bool {
-        let mut each = self.problem.predicted(self.evaluation());
-        each.all(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value >= WHITE)
+        is_white(&self.problem, self.evaluation())
     }
 
     /// Largest root mean square of the residuals of a channel relative to its samples.
@@ -55,6 +54,12 @@ impl Refit {
         let is_smaller = self.worst_misfit() < EXPLAINED * worst_misfit(problem, before);
         is_smaller && (self.is_white() || worst_fit(&self.problem, self.evaluation()) >= POOR)
     }
+}
+
+/// True if the residuals of all channels are white.
+pub(super) fn is_white(problem: &Problem, evaluation: &Evaluation) -> bool {
+    let mut each = problem.predicted(evaluation);
+    each.all(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value >= WHITE)
 }
 
 /// Fit of the worst channel, per cent.
@@ -73,9 +78,18 @@ pub(super) fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
     each.fold(0.0, f64::max)
 }
 
-/// Sets white noise for all channels.
+/// The problem with white noise for all channels, beside the stated errors of an input.
+pub(super) fn uncorrelated(problem: &Problem) -> Problem {
+    let mut white = problem.clone();
+    without_correlation(&mut white.parts_mut().experiments);
+    white
+}
+
+/// Sets white noise for all channels, beside the stated errors of an input.
 pub(super) fn without_correlation(experiments: &mut [Experiment]) {
-    for channel in experiments.iter_mut().flat_map(|e| &mut e.channels) {
+    let is_stated = |c: &Channel| (c.correlation()).is_some_and(|c| c.input_errors().is_some());
+    let channels = experiments.iter_mut().flat_map(|e| &mut e.channels);
+    for channel in channels.filter(|c| !is_stated(c)) {
         *channel = channel.clone().with_noise(NoiseEstimate::default());
     }
 }

@@ -18,7 +18,9 @@ use super::model_tests::{Extension, ExtensionTest};
 use super::record_errors::small_error;
 use super::record_parameters::{self, RecordColumns, RecordParameter};
 use super::refinement::applies;
-use super::refit::{EXPLAINED, Refit, without_correlation, worst_fit, worst_misfit};
+use super::refit::{
+    EXPLAINED, Refit, is_white, uncorrelated, without_correlation, worst_fit, worst_misfit,
+};
 use super::span::{Span, weighted_residuals};
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::objective::Evaluation;
@@ -171,8 +173,11 @@ fn most_significant(
 ) -> Option<FitWarning> {
     tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
     // Far from the optimum of the right candidate another one may be more significant: friction resembles a negative quadratic damping.
-    (tests.first()?.2.abs() >= SIGNIFICANT).then_some(())?;
     let mut best: Option<(f64, MissingTerm)> = None;
+    (tests.first()?.2.abs() >= SIGNIFICANT).then_some(())?;
+    // White residuals of a refit say nothing where those of the fit are white.
+    let is_explained = is_white(&uncorrelated(problem), evaluation);
+    tests.retain(|(.., t)| !is_explained || t.abs() >= SIGNIFICANT);
     for (candidate, value, t) in tests.into_iter().take(REFITTED) {
         match candidate {
             Candidate::Term(kind, term) => {
@@ -272,7 +277,7 @@ fn force(evaluation: &Evaluation, term: Law) -> f64 {
 /// Root mean square of the largest force term of the model.
 fn largest_force(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let mut largest = f64::MIN_POSITIVE;
-    for (place, term) in problem.system.terms.iter().enumerate() {
+    for (place, term) in problem.system.laws().iter().enumerate() {
         let mut all = Vec::new();
         for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
             let Some(values) = (evaluation.nodal_of(experiment.coefficient_set))

@@ -29,22 +29,26 @@ const FEWEST: usize = 200;
 const MOST: usize = 20_000;
 /// Difference of the criteria from which the evidence is very strong (Kass and Raftery 1995).
 const EVIDENCE: f64 = 10.0;
-/// Smallest ratio of two frequencies, less 1.
+/// Ratio of two frequencies, less 1, below which slow variations resemble two modes.
 const APART: f64 = 0.1;
+/// Fewest beats of two modes in a record: their frequencies are as many spacings apart, and the main lobe of a window ends.
+const BEATS: f64 = 2.0;
 /// Largest damping ratio of a mode.
 const DAMPED: f64 = 0.3;
 /// Fewest frequency spacings of the lower mode.
 const FEWEST_PERIODS: f64 = 4.0;
-/// Damping ratio from which the search starts.
+/// Damping ratio from which the search starts where the fit has none between these.
 const START: f64 = 0.02;
-/// Smallest ratio of the mean squares of the residuals before and after at which those after need not be white.
+const RATIOS: std::ops::RangeInclusive<f64> = 1e-3..=0.1;
+/// Smallest ratio of the mean squares of the residuals before and after at which those after need not be white, and that of close modes.
 const SMALLER: f64 = 4.0;
+const MUCH_SMALLER: f64 = 50.0;
 /// Smallest contribution of the weaker mode relative to the stronger one, root mean square.
 const WEAKEST: f64 = 0.01;
 /// Smallest p-value of white residuals.
 const WHITE: f64 = 1e-3;
 /// Steps of the search, and the relative decrease of the sum of squares at which it ends.
-const STEPS: usize = 25;
+const STEPS: usize = 50;
 const AT_REST: f64 = 1e-6;
 /// Relative change of a parameter for finite differences.
 const SMALL: f64 = 1e-4;
@@ -143,8 +147,9 @@ fn second_mode(
     let before = mean_square(&innovations[..count]);
     let residuals: Vec<f64> = channel.residuals(predicted).take(count).collect();
     let nodal = evaluation.nodal_of(experiment.coefficient_set);
-    let frequency = median(Ratios::of(nodal).frequency);
-    let starts = record.starts(frequency, &residuals)?;
+    let ratios = Ratios::of(nodal);
+    let own = [median(ratios.frequency), median(ratios.damping_ratio)];
+    let starts = record.starts(own, &residuals)?;
     let found = map(starts.len(), available(), |i| record.search(starts[i]));
     let found = found.into_iter().flatten();
     let (modes, found) = found.min_by(|a, b| a.1.square.total_cmp(&b.1.square))?;
@@ -153,11 +158,15 @@ fn second_mode(
     let order = channel.correlation().map_or(0, |c| c.order());
     let more = 2.0 + found.of_mode() as f64 - order as f64;
     let gain = n * (before / after).ln() - more * n.ln();
-    let is_explained =
-        mean_square(&residuals) > SMALLER * after || record.is_white(channel, &found);
     let [low, high] = [modes[0][0].min(modes[1][0]), modes[0][0].max(modes[1][0])];
     let is_resolved = low > FEWEST_PERIODS / (spacing * n) && high < 0.5 / spacing;
-    let are_modes = high > (1.0 + APART) * low && modes.iter().all(|m| m[1] < DAMPED);
+    let smaller = match high > (1.0 + APART) * low {
+        true => SMALLER,
+        false => MUCH_SMALLER,
+    };
+    let is_explained =
+        mean_square(&residuals) > smaller * after || record.is_white(channel, &found);
+    let are_modes = (high - low) * spacing * n > BEATS && modes.iter().all(|m| m[1] < DAMPED);
     let [first, second] = found.sizes();
     let is_noticeable = first.min(second) > WEAKEST * first.max(second);
     (gain > EVIDENCE && is_explained && is_resolved && are_modes && is_noticeable).then(|| {
@@ -207,42 +216,47 @@ impl<'a> Samples<'a> {
             };
             (0..count).map(at).collect()
         });
-        let initial = experiment.initial;
-        let is_still = initial.displacement == 0.0 && initial.velocity == 0.0;
+        let initial = experiment.initial.clone();
+        let is_still = initial.displacement(0) == 0.0 && initial.velocity(0) == 0.0;
         Some(Self {
             kind: channel.kind(),
             spacing,
             observed: &channel.observed()[..count],
-            is_from_rest: is_still && experiment.initial_parameters == [None; 2] && input.is_some(),
+            is_from_rest: is_still && experiment.begins_known() && input.is_some(),
             input,
         })
     }
 
-    /// Starts of the search: the mode of the model, or that of the strongest peak, and the next strongest ones.
-    fn starts(&self, frequency: f64, residuals: &[f64]) -> Option<Vec<[Mode; 2]>> {
-        let peaks = |values: &[f64], beside: f64| {
-            let spectrum = Spectrum::of(values, self.spacing)?;
+    /// Starts of the search: the mode of the model, or that of the strongest peak, and the strongest ones beside it, near and far.
+    fn starts(&self, own: Mode, residuals: &[f64]) -> Option<Vec<[Mode; 2]>> {
+        let of_samples = Spectrum::of(self.observed, self.spacing)?;
+        let of_residuals = Spectrum::of(residuals, self.spacing)?;
+        let beside = |spectrum: &Spectrum, first: f64, apart: f64| {
             let each = spectrum.frequencies().zip(spectrum.density());
-            let is_apart = |f: f64| {
-                f > FEWEST_PERIODS * spectrum.resolution() && (f / beside - 1.0).abs() > APART
-            };
-            let apart = each.filter(|(f, _)| is_apart(*f));
-            apart.max_by(|a, b| a.1.total_cmp(b.1)).map(|(f, _)| f)
+            let least = FEWEST_PERIODS * spectrum.resolution();
+            let others = each.filter(|(f, _)| *f > least && (f - first).abs() > apart);
+            let highest = others.max_by(|a, b| a.1.total_cmp(b.1));
+            highest.map(|(second, _)| [first, second])
         };
-        let first = Spectrum::of(self.observed, self.spacing)?.dominant();
+        let [frequency, ratio] = own;
+        let is_mode = frequency.is_finite() && frequency > 0.0;
+        let firsts = is_mode.then_some(frequency).into_iter();
         let mut pairs = Vec::new();
-        if frequency.is_finite() && frequency > 0.0 {
-            pairs.extend(peaks(residuals, frequency).map(|second| [frequency, second]));
+        for first in firsts.chain([of_samples.dominant()]) {
+            for apart in [BEATS * of_samples.resolution(), APART * first] {
+                pairs.extend(beside(&of_residuals, first, apart));
+                pairs.extend(beside(&of_samples, first, apart));
+            }
         }
-        pairs.extend(peaks(self.observed, first).map(|second| [first, second]));
-        pairs.extend(peaks(residuals, first).map(|second| [first, second]));
+        pairs.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
         pairs.dedup();
-        Some(
-            pairs
-                .into_iter()
-                .map(|pair| pair.map(|f| [f, START]))
-                .collect(),
-        )
+        let ratio = if RATIOS.contains(&ratio) {
+            ratio
+        } else {
+            START
+        };
+        let starts = pairs.into_iter().map(|pair| pair.map(|f| [f, ratio]));
+        Some(starts.collect())
     }
 
     /// Local minimum of the sum of squares from a start.

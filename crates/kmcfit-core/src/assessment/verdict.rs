@@ -225,6 +225,8 @@ pub enum VerdictReason {
 pub enum SampleFault {
     /// Samples held at a constant value.
     Dropouts,
+    /// Values that stand for missing samples.
+    MissingCodes,
     /// Single samples far from their neighbours.
     Spikes,
     /// Gaps in the samples of an input.
@@ -268,8 +270,12 @@ pub fn verdict_reasons(
         // A missing term, a second mode or an error of a record explains other reasons.
         let (causes, others): (Vec<_>, Vec<_>) = plausibility.warnings.iter().partition(is_cause);
         let is_explained = !causes.is_empty();
-        let is_new =
-            |w: &&FitWarning| !(is_explained && matches!(w, FitWarning::CoherentResiduals { .. }));
+        let is_new = |w: &&FitWarning| match w {
+            FitWarning::CoherentResiduals { .. }
+            | FitWarning::DisturbedInput { .. }
+            | FitWarning::ClassicalDisagrees(_) => !is_explained,
+            _ => true,
+        };
         let others = others.into_iter().filter(is_new);
         reasons.extend(
             causes

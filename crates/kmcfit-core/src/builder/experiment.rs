@@ -174,7 +174,7 @@ impl ExperimentBuilder<'_> {
     fn initial(
         &self,
         scalars: &mut Vec<ScalarParameter>,
-    ) -> Result<(State, [Option<usize>; 2]), BuildError> {
+    ) -> Result<(State, Vec<Option<usize>>), BuildError> {
         let channels = &self.record.channels;
         let lowest = channels.iter().min_by_key(|c| c.kind);
         let initial = &self.record.initial;
@@ -204,12 +204,7 @@ impl ExperimentBuilder<'_> {
                 }
             }
         }
-        let [displacement, velocity] = state;
-        let state = State {
-            displacement,
-            velocity,
-        };
-        Ok((state, estimated))
+        Ok((State::from(state.to_vec()), estimated.to_vec()))
     }
 
     /// Builds one channel, with the inputs and the base motion at its samples.

@@ -11,7 +11,7 @@ use crate::structure::Law;
 pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     let scalars = problem.functions.scalars();
     let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
-    let terms = &problem.system.terms;
+    let terms = problem.system.laws();
     // With an estimated stiffness a shifted quadratic spring is another quadratic spring.
     let mut functions = problem.functions.iter();
     let has_stiffness =
@@ -69,10 +69,10 @@ fn gains_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
 }
 
 fn starts_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
-    let rest = [e.initial.displacement, e.initial.velocity];
-    (0..2).all(|q| match e.initial_parameters[q] {
-        Some(index) => open(Some(index)),
-        None => rest[q] == 0.0,
+    let mut components = e.initial_parameters.iter().zip(e.initial.components());
+    components.all(|(estimated, known)| match estimated {
+        Some(index) => open(Some(*index)),
+        None => *known == 0.0,
     })
 }
 

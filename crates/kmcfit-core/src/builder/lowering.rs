@@ -8,7 +8,7 @@ use crate::functions::Parameterization;
 use crate::problem::Problem;
 use crate::signal::even_spacing;
 use crate::solvers::{Measurements, estimate_states};
-use crate::structure::Law;
+use crate::structure::{Law, Structure};
 use crate::system::{Grid, System};
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ impl Builder {
         let system = System {
             grid,
             method: self.method,
-            terms: self.terms()?,
+            structure: Structure::one(self.terms()?),
         };
         let mut scalars = Vec::new();
         let mut validation = Vec::new();
@@ -230,11 +230,7 @@ impl Builder {
 
     /// Sets initial states without a start or prior to those estimated from the samples.
     fn start_at_samples(&self, problem: &mut Problem) {
-        if problem
-            .experiments
-            .iter()
-            .all(|e| e.initial_parameters == [None; 2])
-        {
+        if problem.experiments.iter().all(|e| e.begins_known()) {
             return;
         }
         let fitted = self.records.iter().filter(|record| !record.validation);
@@ -242,11 +238,14 @@ impl Builder {
         let first = problem.functions.scalar_range().start;
         let states = match self.states.is_empty() {
             true => estimate_states(problem),
-            false => self.states.iter().copied().map(Some).collect(),
+            false => self.states.iter().cloned().map(Some).collect(),
         };
         for ((record, experiment), state) in fitted.zip(&problem.experiments).zip(states) {
             let Some(state) = state else { continue };
-            for (q, value) in [state.displacement, state.velocity].into_iter().enumerate() {
+            for (q, value) in [state.displacement(0), state.velocity(0)]
+                .into_iter()
+                .enumerate()
+            {
                 if let (Some(index), true) = (
                     experiment.initial_parameters[q],
                     record.initial[q].is_open(),

@@ -230,6 +230,27 @@ impl Parameterization {
             .collect()
     }
 
+    /// The start with the parameters `theta` of another parameterisation in the functions and scalars of the same name and number.
+    pub fn start_at(&self, other: &Self, theta: &[f64]) -> Vec<f64> {
+        let named = |parts: &Self| -> Vec<(String, Range<usize>)> {
+            let functions = parts.list.iter().map(CoefficientFunction::name);
+            let functions = functions.zip(parts.ranges().iter().cloned());
+            let scalars = parts.scalars.iter().map(|scalar| scalar.name.clone());
+            let scalars = scalars.zip(parts.scalar_range().map(|i| i..i + 1));
+            functions.chain(scalars).collect()
+        };
+        let others = named(other);
+        let mut start = self.start();
+        for (name, range) in named(self) {
+            let same =
+                |(other, of): &&(String, Range<usize>)| *other == name && of.len() == range.len();
+            if let Some((_, of)) = others.iter().find(same) {
+                start[range].copy_from_slice(&theta[of.clone()]);
+            }
+        }
+        start
+    }
+
     /// Sets the start.
     ///
     /// # Panics

@@ -21,7 +21,11 @@ impl Ratios {
     /// # Panics
     /// If there are fewer than two terms.
     pub fn of(nodal: &NodalCoefficients) -> Self {
-        let (m, c, k) = (&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]);
+        let (m, c, k) = (
+            &nodal.inertias[0],
+            &nodal.coefficients[0],
+            &nodal.coefficients[1],
+        );
         let over_mass = |f: &[f64]| -> Vec<f64> { f.iter().zip(m).map(|(f, m)| f / m).collect() };
         let k_over_m = over_mass(k);
         let c_over_m = over_mass(c);

@@ -205,7 +205,7 @@ fn of_functions<'a>(
     chosen: &'a [usize],
 ) -> impl Iterator<Item = &'a mut FunctionClassification> {
     let assembly = problem.functions.coefficient_set(0).to_vec();
-    let terms = problem.system.terms.clone();
+    let terms = problem.system.laws().to_vec();
     let functions = problem.functions.ranges().len();
     let is_chosen = move |index: usize, name: &str| {
         let of = |term: Law| {
@@ -292,9 +292,9 @@ pub fn classify_functions(
 ) -> Vec<FunctionClassification> {
     let sizes = problem.median_scales(evaluation);
     let assembly = problem.functions.coefficient_set(0);
-    let mass = median_size(&evaluation.nodal.mass);
+    let mass = median_size(&evaluation.nodal.inertias[0]);
     let of = |term: Law| {
-        let place = problem.system.terms.iter().position(|t| *t == term)?;
+        let place = problem.system.laws().iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
     };
     let named = [("k/m", of(Law::Stiffness)), ("c/m", of(Law::Damping))];

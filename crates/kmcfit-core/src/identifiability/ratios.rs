@@ -17,7 +17,7 @@ pub struct RatioOfSet {
 /// `k/m`, `c/m`, natural frequency and damping ratio of the shared coefficient set, as far as the system has these terms.
 pub fn ratios_of_set(problem: &Problem) -> Vec<RatioOfSet> {
     let set = problem.functions.coefficient_set(0);
-    let terms = &problem.system.terms;
+    let terms = problem.system.laws();
     // The functions of a coefficient: its own and its known parts.
     let at_place = |place: usize| -> Vec<usize> {
         let parts = set.parts().filter(|(other, _)| *other == place);

@@ -35,7 +35,11 @@ fn differences(problem: &Problem, evaluation: &Evaluation) -> Option<Vec<Vec<f64
 fn narrower(problem: &Problem) -> Option<Problem> {
     let width = problem.system.friction_width()?;
     let mut narrow = problem.clone();
-    narrow.parts_mut().system.set_friction_width(0.5 * width);
+    narrow
+        .parts_mut()
+        .system
+        .structure
+        .set_friction_width(0.5 * width);
     Some(narrow)
 }
 

@@ -1,185 +1,196 @@
 //! Errors of an input as they appear in the samples of one channel, and their whitening by a Kalman filter along the record.
 //!
-//! With the errors `w_k` of the input samples, of standard deviation `s`, and the noise `v_j` of the channel, both independent, the
-//! normalised errors of the samples are
+//! With the errors `w_k` of the input samples and the noise `v_j` of the channel, independent and of standard deviations in the ratio
+//! `rho`, the errors of the samples and their covariance relative to that of the noise are
 //!
 //! ```text
-//! x_i+1 = A_i x_i + l_i e_i + r_i e_i+1,    z_j = h_j (x_i, x_i+1) + d_j (e_i, e_i+1) + v_j,    R = I + s^2 G G^T
+//! x_i+1 = A_i x_i + l_i e_i + r_i e_i+1,    z_j = h_j (x_i, x_i+1) + d_j e(t_j) + v_j,    R = I + rho^2 G G^T
 //! ```
 //!
-//! with the change `x_i` of displacement and velocity at node `i`, the error `e_i` of the input there (linear between input
-//! samples), and the derivatives `G` of `z` with respect to `w`. The filter gives `W` with `W R W^T = I` in a time proportional to the
-//! number of nodes.
+//! with the change `x_i` of displacements and velocities at node `i`, the error `e_i` of the input there and `e(t_j)` at the sample (linear
+//! between input samples), and the derivatives `G` of `z` with respect to `w`. The state of the filter is `x_i` and the errors of the input
+//! samples on which step `i` depends. It gives `W` with `W R W^T = I` in a time proportional to the number of nodes.
 //!
 //! Source: R. E. Kalman, J. Basic Eng. 82 (1960) 35-45; F. C. Schweppe, IEEE Trans. Inf. Theory 11 (1965) 61-70 for the likelihood.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, DVector};
 
-/// Displacement, velocity, and the errors of the input samples on both sides at a node; displacement, velocity and error of the
-/// input at the node before it.
-const STATES: usize = 7;
-type State = SVector<f64, STATES>;
-type Matrix = SMatrix<f64, STATES, STATES>;
-type Noise = SMatrix<f64, STATES, 2>;
-
-/// Derivatives of the state `(y, v)` at the right node of a step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Derivatives of the displacements and velocities at the right node of a step.
+#[derive(Debug, Clone, PartialEq)]
 pub struct InputStep {
-    /// With respect to displacement and velocity at the left node.
-    pub state: [[f64; 2]; 2],
+    /// With respect to those at the left node.
+    pub state: DMatrix<f64>,
     /// With respect to the input at the left and at the right node.
-    pub input: [[f64; 2]; 2],
+    pub input: [DVector<f64>; 2],
 }
 
-/// Derivatives of one sample over its sigma.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Derivatives of one sample.
+#[derive(Debug, Clone, PartialEq)]
 pub struct InputRow {
     /// Step that contains the sample.
     pub step: usize,
-    /// With respect to displacement and velocity at the left node of the step, then at the right.
-    pub states: [f64; 4],
-    /// With respect to the input at the left and at the right node.
-    pub input: [f64; 2],
+    /// With respect to displacements and velocities at the left and at the right node of the step.
+    pub states: [DVector<f64>; 2],
+    /// With respect to the input at the time of the sample.
+    pub input: f64,
+    /// Index of the input sample before that time, and the fraction of the way to the next one.
+    pub place: (usize, f64),
 }
 
 /// The effect of errors of the input on the samples of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputErrors {
-    /// Standard deviation of the errors of the input samples.
-    sigma: f64,
+    /// Standard deviation of the errors of the input samples over that of the noise of the channel.
+    ratio: f64,
+    /// Number of displacements and velocities, the first ones of the state.
+    motions: usize,
     transitions: Vec<Transition>,
     rows: Vec<Row>,
-    /// Index of the input sample before the first node.
+    /// Gains and variances of the innovations of the rows.
+    gains: Vec<(DVector<f64>, f64)>,
+    /// Index of the first input sample of the first state.
     first: usize,
 }
 
-/// `s_i+1 = matrix s_i + noise w / sigma`.
+/// From the state at the left node of a step to that of the next step.
 #[derive(Debug, Clone, PartialEq)]
 struct Transition {
-    matrix: Matrix,
-    noise: Noise,
-    /// Indices of the input samples that enter, where any do.
-    enter: [Option<usize>; 2],
+    matrix: DMatrix<f64>,
+    /// Index of the first input sample of the next state, and the number of its last ones that are new.
+    first: usize,
+    entering: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
     step: usize,
-    /// Transition from the row before, and the covariance of the noise that enters; `None` within the same step.
-    advance: Option<(Matrix, Matrix)>,
-    derivatives: State,
-    gain: State,
-    /// Variance of the innovation.
-    variance: f64,
+    /// Transposed transition from the row before, and the covariance of what enters for errors of unit variance; `None` within a step.
+    advance: Option<(DMatrix<f64>, DMatrix<f64>)>,
+    derivatives: DVector<f64>,
 }
 
 impl InputErrors {
-    /// The errors of standard deviation `sigma` of input samples; `places` are, for each node, the index of the input sample before it
-    /// and the fraction of the way to the next one. `rows` are in the order of time.
+    /// No errors of the input samples; `places` are, for each node, the index of the input sample before it and the fraction of the way
+    /// to the next one. `rows` are in the order of time.
     ///
     /// # Panics
-    /// Unless there is one more place than steps.
-    pub fn new(
-        sigma: f64,
-        steps: &[InputStep],
-        places: &[(usize, f64)],
-        rows: &[InputRow],
-    ) -> Self {
+    /// Unless there is one more place than steps, and at least one step.
+    pub fn new(steps: &[InputStep], places: &[(usize, f64)], rows: &[InputRow]) -> Self {
         assert_eq!(places.len(), steps.len() + 1, "a place for each node");
+        let motions = steps[0].state.nrows();
+        let widths = places.windows(2).map(|pair| pair[1].0 - pair[0].0 + 2);
+        let size = motions + widths.max().unwrap_or(2);
         let each = steps.iter().zip(places.windows(2));
         let transitions: Vec<Transition> = each
-            .map(|(step, pair)| transition(step, pair[0], pair[1], sigma))
+            .map(|(step, pair)| transition(step, pair[0], pair[1], size))
             .collect();
         let rows = rows.iter().map(|row| {
-            let [a, b, c, d] = row.states;
-            let [left, right] = row.input;
-            let fraction = places[row.step + 1].1;
-            let (before, after) = (right * (1.0 - fraction), right * fraction);
+            let [left, right] = &row.states;
+            let mut derivatives = transitions[row.step].matrix.rows(0, motions).tr_mul(right);
+            let mut here = derivatives.rows_mut(0, motions);
+            here += left;
+            let (k, fraction) = row.place;
+            let k = k.saturating_sub(places[row.step].0).min(size - motions - 2);
+            derivatives[motions + k] += row.input * (1.0 - fraction);
+            derivatives[motions + k + 1] += row.input * fraction;
             Row {
                 step: row.step,
                 advance: None,
-                derivatives: State::from([c, d, before, after, a, b, left]),
-                gain: State::zeros(),
-                variance: 1.0,
+                derivatives,
             }
         });
         let mut errors = Self {
-            sigma,
+            ratio: 0.0,
+            motions,
+            gains: vec![(DVector::zeros(size), 1.0); rows.len()],
             rows: rows.collect(),
             transitions,
             first: places[0].0,
         };
-        errors.join();
-        errors.filter();
+        errors.join(size);
         errors
     }
 
     /// Joins the transitions between rows, so that the filter takes one step for each sample, whatever the number of nodes.
-    fn join(&mut self) {
+    fn join(&mut self, size: usize) {
         let mut next = 0;
-        for row in &mut self.rows {
-            if next > row.step {
+        for row in self.rows.iter_mut().filter(|row| row.step > 0) {
+            if next == row.step {
                 continue;
             }
-            let (mut matrix, mut covariance) = (Matrix::identity(), Matrix::zeros());
-            for step in &self.transitions[next..=row.step] {
-                matrix = step.matrix * matrix;
-                covariance = step.matrix * covariance * step.matrix.transpose()
-                    + step.noise * step.noise.transpose();
+            let mut matrix = DMatrix::identity(size, size);
+            let mut covariance = DMatrix::zeros(size, size);
+            for step in &self.transitions[next..row.step] {
+                matrix = &step.matrix * matrix;
+                covariance = &step.matrix * covariance * step.matrix.transpose();
+                (size - step.entering..size).for_each(|k| covariance[(k, k)] += 1.0);
             }
-            row.advance = Some((matrix, covariance));
-            next = row.step + 1;
+            row.advance = Some((matrix.transpose(), covariance));
+            next = row.step;
         }
     }
 
-    /// Sets the gains and variances by the Riccati recursion.
-    fn filter(&mut self) {
-        let mut covariance = Matrix::zeros();
-        covariance[(2, 2)] = self.sigma * self.sigma;
-        covariance[(3, 3)] = self.sigma * self.sigma;
-        for row in &mut self.rows {
-            if let Some((matrix, noise)) = &row.advance {
-                covariance = matrix * covariance * matrix.transpose() + noise;
+    /// Number of states.
+    fn size(&self) -> usize {
+        self.transitions[0].matrix.nrows()
+    }
+
+    /// The Riccati recursion over the first `count` rows: passes each with its gain and the variance of its innovation to `take`.
+    fn each_gain(
+        &self,
+        ratio: f64,
+        count: usize,
+        mut take: impl FnMut(usize, &Row, &DVector<f64>, f64),
+    ) {
+        let size = self.size();
+        let variance = ratio * ratio;
+        let mut covariance = DMatrix::zeros(size, size);
+        (self.motions..size).for_each(|k| covariance[(k, k)] = variance);
+        let mut product = DMatrix::zeros(size, size);
+        let mut gain = DVector::zeros(size);
+        for (j, row) in self.rows.iter().take(count).enumerate() {
+            if let Some((transposed, entering)) = &row.advance {
+                product.gemm(1.0, &covariance, transposed, 0.0);
+                covariance.copy_from(entering);
+                covariance.gemm_tr(1.0, transposed, &product, variance);
             }
-            let column = covariance * row.derivatives;
-            row.variance = 1.0 + row.derivatives.dot(&column);
-            row.gain = column / row.variance;
-            covariance -= row.gain * column.transpose();
+            gain.gemv(1.0, &covariance, &row.derivatives, 0.0);
+            let innovation = 1.0 + row.derivatives.dot(&gain);
+            covariance.ger(-1.0 / innovation, &gain, &gain, 1.0);
+            gain /= innovation;
+            take(j, row, &gain, innovation);
         }
     }
 
-    /// Standard deviation of the errors of the input samples.
-    pub fn sigma(&self) -> f64 {
-        self.sigma
+    /// Standard deviation of the errors of the input samples over that of the noise of the channel.
+    pub fn ratio(&self) -> f64 {
+        self.ratio
     }
 
     /// The same effect of errors of another standard deviation.
     #[must_use]
-    pub fn with_sigma(&self, sigma: f64) -> Self {
-        let mut errors = self.clone();
-        let ratio = sigma / self.sigma;
-        for step in &mut errors.transitions {
-            step.noise *= ratio;
-        }
-        for row in &mut errors.rows {
-            if let Some((_, noise)) = &mut row.advance {
-                *noise *= ratio * ratio;
-            }
-        }
-        errors.sigma = sigma;
-        errors.filter();
-        errors
+    pub fn with_ratio(mut self, ratio: f64) -> Self {
+        let mut gains = Vec::with_capacity(self.rows.len());
+        self.each_gain(ratio, self.rows.len(), |_, _, gain, variance| {
+            gains.push((gain.clone(), variance));
+        });
+        self.ratio = ratio;
+        self.gains = gains;
+        self
     }
 
-    /// The effect with all derivatives of the samples multiplied by `factor`.
-    #[must_use]
-    pub fn scaled(&self, factor: f64) -> Self {
-        let mut errors = self.clone();
-        for row in &mut errors.rows {
-            row.derivatives *= factor;
-        }
-        errors.filter();
-        errors
+    /// `values^T R^-1 values` and `log |R|` of the first samples with errors of another standard deviation.
+    pub fn likelihood(&self, ratio: f64, values: &[f64]) -> [f64; 2] {
+        let mut state = DVector::zeros(self.size());
+        let mut sums = [0.0; 2];
+        let mut before = state.clone();
+        self.each_gain(ratio, values.len(), |j, row, gain, variance| {
+            let innovation = values[j] - row.predict(&mut state, &mut before);
+            state.axpy(innovation, gain, 1.0);
+            sums[0] += innovation * innovation / variance;
+            sums[1] += variance.ln();
+        });
+        sums
     }
 
     /// The effect on the first `count` samples.
@@ -187,27 +198,26 @@ impl InputErrors {
     pub fn first(&self, count: usize) -> Self {
         let mut part = self.clone();
         part.rows.truncate(count);
+        part.gains.truncate(count);
         part
     }
 
-    /// Passes each row with the state before its update to `take`, which returns the innovation.
-    fn run(&self, mut take: impl FnMut(usize, &Row, f64) -> f64) {
-        let mut state = State::zeros();
-        for (j, row) in self.rows.iter().enumerate() {
-            if let Some((matrix, _)) = &row.advance {
-                state = matrix * state;
-            }
-            let innovation = take(j, row, row.derivatives.dot(&state));
-            state += row.gain * innovation;
+    /// Passes each row with its prediction, gain and variance to `take`, which returns the innovation.
+    fn run(&self, mut take: impl FnMut(usize, f64, f64) -> f64) {
+        let mut state = DVector::zeros(self.size());
+        let mut before = state.clone();
+        for (j, (row, (gain, variance))) in self.rows.iter().zip(&self.gains).enumerate() {
+            let predicted = row.predict(&mut state, &mut before);
+            state.axpy(take(j, predicted, *variance), gain, 1.0);
         }
     }
 
     /// `W values`.
     pub fn whiten(&self, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        self.run(|j, row, predicted| {
+        self.run(|j, predicted, variance| {
             let innovation = values[j] - predicted;
-            out[j] = innovation / row.variance.sqrt();
+            out[j] = innovation / variance.sqrt();
             innovation
         });
         out
@@ -216,8 +226,8 @@ impl InputErrors {
     /// `W^-1 values`.
     pub fn colour(&self, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        self.run(|j, row, predicted| {
-            let innovation = values[j] * row.variance.sqrt();
+        self.run(|j, predicted, variance| {
+            let innovation = values[j] * variance.sqrt();
             out[j] = innovation + predicted;
             innovation
         });
@@ -227,12 +237,15 @@ impl InputErrors {
     /// `W^T values`.
     pub fn whiten_transpose(&self, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        let mut adjoint = State::zeros();
-        for (j, row) in self.rows.iter().enumerate().rev() {
-            out[j] = values[j] / row.variance.sqrt() + row.gain.dot(&adjoint);
-            adjoint -= row.derivatives * out[j];
-            if let Some((matrix, _)) = &row.advance {
-                adjoint = matrix.tr_mul(&adjoint);
+        let mut adjoint = DVector::zeros(self.size());
+        let mut later = adjoint.clone();
+        let rows = self.rows.iter().zip(&self.gains).enumerate();
+        for (j, (row, (gain, variance))) in rows.rev() {
+            out[j] = values[j] / variance.sqrt() + gain.dot(&adjoint);
+            adjoint.axpy(-out[j], &row.derivatives, 1.0);
+            if let Some((transposed, _)) = &row.advance {
+                later.gemv(1.0, transposed, &adjoint, 0.0);
+                adjoint.copy_from(&later);
             }
         }
         out
@@ -240,165 +253,144 @@ impl InputErrors {
 
     /// `log |R|`.
     pub fn log_determinant(&self) -> f64 {
-        self.rows.iter().map(|row| row.variance.ln()).sum()
+        self.gains.iter().map(|(_, variance)| variance.ln()).sum()
     }
 
     /// `G errors`: changes of the samples by errors of the input samples.
     pub fn response(&self, errors: &[f64]) -> Vec<f64> {
-        let error = |k: Option<usize>| k.and_then(|k| errors.get(k)).copied().unwrap_or(0.0);
-        let mut state = State::zeros();
-        state[2] = error(Some(self.first));
-        state[3] = error(Some(self.first + 1));
-        let mut out = vec![0.0; self.rows.len()];
-        let mut next = 0;
+        let error = |k: usize| errors.get(k).copied().unwrap_or(0.0);
+        let (size, motions) = (self.size(), self.motions);
+        let mut state = DVector::zeros(size);
+        (motions..size).for_each(|k| state[k] = error(self.first + k - motions));
+        let mut out = Vec::with_capacity(self.rows.len());
         for (i, step) in self.transitions.iter().enumerate() {
-            let enter = SVector::from(step.enter.map(|k| error(k) / self.sigma));
-            state = step.matrix * state + step.noise * enter;
-            while next < self.rows.len() && self.rows[next].step == i {
-                out[next] = self.rows[next].derivatives.dot(&state);
-                next += 1;
-            }
+            let rows = self.rows[out.len()..]
+                .iter()
+                .take_while(|row| row.step == i);
+            out.extend(rows.map(|row| row.derivatives.dot(&state)));
+            state = &step.matrix * state;
+            let entering = size - step.entering..size;
+            entering.for_each(|k| state[k] = error(step.first + k - motions));
         }
         out
     }
 
-    /// Most likely errors of the `count` input samples, `s^2 G^T R^-1 values`, given the normalised errors `values` of the samples.
+    /// Most likely errors of the `count` input samples, `rho^2 G^T R^-1 values`, given the errors `values` of the samples.
     pub fn smoothed(&self, values: &[f64], count: usize) -> Vec<f64> {
         let inverse = self.whiten_transpose(&self.whiten(values));
+        let (size, motions) = (self.size(), self.motions);
+        let variance = self.ratio * self.ratio;
         let mut errors = vec![0.0; count];
-        let mut add = |k: Option<usize>, value: f64| {
-            if let Some(error) = k.and_then(|k| errors.get_mut(k)) {
-                *error += value;
+        let mut add = |k: usize, value: f64| {
+            if let Some(error) = errors.get_mut(k) {
+                *error += variance * value;
             }
         };
-        let mut adjoint = State::zeros();
+        let mut adjoint = DVector::zeros(size);
         let mut last = self.rows.len();
         for (i, step) in self.transitions.iter().enumerate().rev() {
+            let entering = size - step.entering..size;
+            entering.for_each(|k| add(step.first + k - motions, adjoint[k]));
+            adjoint = step.matrix.tr_mul(&adjoint);
             while last > 0 && self.rows[last - 1].step == i {
                 last -= 1;
-                adjoint += self.rows[last].derivatives * inverse[last];
+                adjoint.axpy(inverse[last], &self.rows[last].derivatives, 1.0);
             }
-            let entered = step.noise.tr_mul(&adjoint) * self.sigma;
-            add(step.enter[0], entered[0]);
-            add(step.enter[1], entered[1]);
-            adjoint = step.matrix.tr_mul(&adjoint);
         }
-        let variance = self.sigma * self.sigma;
-        add(Some(self.first), variance * adjoint[2]);
-        add(Some(self.first + 1), variance * adjoint[3]);
+        (motions..size).for_each(|k| add(self.first + k - motions, adjoint[k]));
         errors
     }
 }
 
-/// The transition over one step from the place of its left node to that of its right node.
-fn transition(step: &InputStep, from: (usize, f64), to: (usize, f64), sigma: f64) -> Transition {
-    let advance = |state: [f64; 4], enter: [f64; 2]| -> State {
-        let [y, v, before, after] = state;
-        let here = (1.0 - from.1) * before + from.1 * after;
-        let [before, after] = match to.0 - from.0 {
-            0 => [before, after],
-            1 => [after, enter[1]],
-            _ => enter,
-        };
-        let there = (1.0 - to.1) * before + to.1 * after;
-        let end = |q: usize| {
-            step.state[0][q] * y
-                + step.state[1][q] * v
-                + step.input[0][q] * here
-                + step.input[1][q] * there
-        };
-        State::from([end(0), end(1), before, after, y, v, here])
-    };
-    let unit = |j: usize| std::array::from_fn(|i| if i == j { 1.0 } else { 0.0 });
-    let mut matrix = Matrix::zeros();
-    for j in 0..4 {
-        matrix.set_column(j, &advance(unit(j), [0.0; 2]));
+impl Row {
+    /// Advances the state of the row before, and returns what it predicts; `before` is space for a state.
+    fn predict(&self, state: &mut DVector<f64>, before: &mut DVector<f64>) -> f64 {
+        if let Some((transposed, _)) = &self.advance {
+            before.copy_from(state);
+            state.gemv_tr(1.0, transposed, before, 0.0);
+        }
+        self.derivatives.dot(state)
     }
-    let mut noise = Noise::zeros();
-    for k in 0..2 {
-        let enter = [[sigma, 0.0], [0.0, sigma]][k];
-        noise.set_column(k, &advance([0.0; 4], enter));
+}
+
+/// The transition of `size` states over one step, from the place of its left node to that of its right node.
+fn transition(step: &InputStep, from: (usize, f64), to: (usize, f64), size: usize) -> Transition {
+    let motions = step.state.nrows();
+    let entering = to.0 - from.0;
+    let mut matrix = DMatrix::zeros(size, size);
+    matrix
+        .view_mut((0, 0), (motions, motions))
+        .copy_from(&step.state);
+    for (input, (k, fraction)) in step.input.iter().zip([(0, from.1), (entering, to.1)]) {
+        for (k, share) in [(k, 1.0 - fraction), (k + 1, fraction)] {
+            let mut column = matrix.column_mut(motions + k);
+            column.rows_mut(0, motions).axpy(share, input, 1.0);
+        }
     }
-    let enter = match to.0 - from.0 {
-        0 => [None, None],
-        1 => [None, Some(to.0 + 1)],
-        _ => [Some(to.0), Some(to.0 + 1)],
-    };
+    (motions + entering..size).for_each(|k| matrix[(k - entering, k)] = 1.0);
     Transition {
         matrix,
-        noise,
-        enter,
+        first: to.0,
+        entering,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{DMatrix, DVector};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     /// `W R W^T = I`, the transpose, the inverse, the determinant, and the most likely errors, against dense matrices, for nodes on every
-    /// input sample, several nodes for each input sample, and several input samples for each node.
+    /// input sample, several nodes for each input sample, and several input samples for each node, one coordinate and two.
     #[test]
     fn the_filter_is_a_root_of_the_dense_matrix() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        for spacing in [1.0, 0.3, 2.5] {
+        for (spacing, motions) in [(1.0, 2), (0.3, 2), (2.5, 2), (0.7, 4), (1.6, 4)] {
             let nodes = 14;
             let mut number = || random.random_range(-1.0..1.0);
+            // Decays, so that no sum loses digits.
             let steps: Vec<InputStep> = (1..nodes)
                 .map(|_| InputStep {
-                    state: [[number(), number()], [number(), number()]],
-                    input: [[number(), number()], [number(), number()]],
+                    state: DMatrix::from_fn(motions, motions, |_, _| 0.7 * number()),
+                    input: [0, 1].map(|_| DVector::from_fn(motions, |_, _| number())),
                 })
                 .collect();
-            let places: Vec<(usize, f64)> = (0..nodes)
-                .map(|i| (spacing * i as f64).floor())
-                .zip((0..nodes).map(|i| (spacing * i as f64).fract()))
-                .map(|(k, fraction)| (k as usize, fraction))
-                .collect();
+            let place = |x: f64| ((spacing * x).floor() as usize, (spacing * x).fract());
+            let places: Vec<(usize, f64)> = (0..nodes).map(|i| place(i as f64)).collect();
             let rows: Vec<InputRow> = (0..20)
-                .map(|j| InputRow {
-                    step: (j * (nodes - 1)) / 20,
-                    states: std::array::from_fn(|_| number()),
-                    input: [number(), number()],
+                .map(|j| {
+                    let step = (j * (nodes - 1)) / 20;
+                    InputRow {
+                        step,
+                        states: [0, 1].map(|_| DVector::from_fn(motions, |_, _| number())),
+                        input: number(),
+                        place: place(step as f64 + 0.05 * (j % 20) as f64),
+                    }
                 })
                 .collect();
-            let errors = InputErrors::new(0.7, &steps, &places, &rows);
+            let errors = InputErrors::new(&steps, &places, &rows).with_ratio(0.7);
             let inputs = places[nodes - 1].0 + 2;
             // The definition, without a filter.
             let mut g = DMatrix::zeros(rows.len(), inputs);
             for k in 0..inputs {
-                let at = |i: usize| {
-                    let (before, fraction) = places[i];
-                    if before == k {
-                        1.0 - fraction
-                    } else if before + 1 == k {
-                        fraction
-                    } else {
-                        0.0
-                    }
+                let at = |(before, fraction): (usize, f64)| match k.checked_sub(before) {
+                    Some(0) => 1.0 - fraction,
+                    Some(1) => fraction,
+                    _ => 0.0,
                 };
-                let mut states = vec![[0.0; 2]];
+                let mut states = vec![DVector::zeros(motions)];
                 for (i, step) in steps.iter().enumerate() {
-                    let [y, v] = states[i];
-                    states.push(std::array::from_fn(|q| {
-                        step.state[0][q] * y
-                            + step.state[1][q] * v
-                            + step.input[0][q] * at(i)
-                            + step.input[1][q] * at(i + 1)
-                    }));
+                    let [left, right] = &step.input;
+                    let next =
+                        &step.state * &states[i] + left * at(places[i]) + right * at(places[i + 1]);
+                    states.push(next);
                 }
                 for (j, row) in rows.iter().enumerate() {
-                    let i = row.step;
-                    let both = [
-                        states[i][0],
-                        states[i][1],
-                        states[i + 1][0],
-                        states[i + 1][1],
-                    ];
-                    let by_states: f64 = row.states.iter().zip(both).map(|(a, b)| a * b).sum();
-                    g[(j, k)] = by_states + row.input[0] * at(i) + row.input[1] * at(i + 1);
+                    let [left, right] = &row.states;
+                    g[(j, k)] = left.dot(&states[row.step])
+                        + right.dot(&states[row.step + 1])
+                        + row.input * at(row.place);
                 }
             }
             let r = DMatrix::identity(20, 20) + 0.49 * &g * g.transpose();
@@ -430,11 +422,11 @@ mod tests {
                 &errors.response(&drawn),
                 &(&g * DVector::from_column_slice(&drawn)),
             );
-            let other = InputErrors::new(0.2, &steps, &places, &rows);
-            near(
-                &errors.with_sigma(0.2).whiten(&values),
-                &DVector::from_vec(other.whiten(&values)),
-            );
+            let other = errors.clone().with_ratio(0.2);
+            let [squares, determinant] = errors.likelihood(0.2, &values);
+            let whitened = DVector::from_vec(other.whiten(&values));
+            assert!((squares - whitened.norm_squared()).abs() < 1e-10 * squares);
+            assert!((determinant - other.log_determinant()).abs() < 1e-10 * determinant.abs());
             near(
                 &errors.first(9).whiten(&values[..9]),
                 &DVector::from_column_slice(&errors.whiten(&values)[..9]),

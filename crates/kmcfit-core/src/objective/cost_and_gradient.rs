@@ -50,7 +50,7 @@ impl Problem {
         least_squares(
             &self.system,
             [mass, damping, stiffness],
-            experiment.initial,
+            &experiment.initial,
             channel.observed(),
             weights,
             [by_mass, by_damping, by_stiffness],

@@ -165,7 +165,7 @@ impl Problem {
             let source = self.source(evaluation, e, slopes, direct, &mut scalars);
             let share = view.discrete_adjoint(&source);
             add(total, &share.nodal);
-            add_initial(experiment.initial_parameters, share.initial, &mut scalars);
+            add_initial(&experiment.initial_parameters, share.initial, &mut scalars);
         }
         for (which, nodal) in nodal.iter().enumerate() {
             if let Some(nodal) = nodal {
@@ -231,7 +231,7 @@ impl Problem {
                 gradient[first + j] += entry * (direct[place] + sums[place]);
             }
         }
-        add_initial(experiment.initial_parameters, initial, &mut own);
+        add_initial(&experiment.initial_parameters, initial, &mut own);
         scalars.iter_mut().zip(&own).for_each(|(s, own)| *s += own);
         true
     }
@@ -258,7 +258,7 @@ impl Problem {
                 Some(total) => add(total, &share.nodal),
                 none => *none = Some(share.nodal),
             }
-            add_initial(experiment.initial_parameters, share.initial, &mut scalars);
+            add_initial(&experiment.initial_parameters, share.initial, &mut scalars);
         }
         let or_empty = |nodal: Option<NodalCoefficients>| {
             nodal.unwrap_or_else(|| self.functions.empty_nodal())
@@ -304,13 +304,10 @@ impl Problem {
 }
 
 /// Adds the gradient with respect to an initial state to those of its scalar parameters.
-fn add_initial(estimated: [Option<usize>; 2], gradient: State, scalars: &mut [f64]) {
-    for (index, slope) in estimated
-        .into_iter()
-        .zip([gradient.displacement, gradient.velocity])
-    {
+fn add_initial(estimated: &[Option<usize>], gradient: State, scalars: &mut [f64]) {
+    for (index, slope) in estimated.iter().zip(gradient.components()) {
         if let Some(index) = index {
-            scalars[index] += slope;
+            scalars[*index] += slope;
         }
     }
 }

@@ -156,7 +156,7 @@ impl Problem {
                 nodal,
                 excitation,
             };
-            driven.respond(mode, initial, response)?;
+            driven.respond(mode, &initial, response)?;
             let view = SimulatedRecord {
                 system,
                 nodal,
@@ -197,13 +197,11 @@ impl Problem {
         let scalars = self.scalars(along);
         let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
             let view = self.view(evaluation, e);
-            let change = |estimated: Option<usize>| estimated.map_or(0.0, |i| scalars[i]);
+            let initial = experiment.initial_parameters.iter();
+            let initial = initial.map(|estimated| estimated.map_or(0.0, |i| scalars[i]));
             let direction = SystemTangent {
                 nodal: self.functions.direction(along, experiment.coefficient_set),
-                initial: State {
-                    displacement: change(experiment.initial_parameters[0]),
-                    velocity: change(experiment.initial_parameters[1]),
-                },
+                initial: State::from(initial.collect::<Vec<f64>>()),
             };
             let response = view.driven().tangent(view.response, &direction);
             let along = RecordTangent {

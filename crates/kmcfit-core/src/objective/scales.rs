@@ -28,7 +28,7 @@ impl Problem {
     }
 
     fn sizes(&self, evaluation: &Evaluation, size_of: fn(&[f64]) -> f64) -> Vec<f64> {
-        let terms = &self.system.terms;
+        let terms = self.system.laws();
         let step = self.system.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
             .map(|response| squares(response, terms, step))
@@ -45,7 +45,7 @@ impl Problem {
                 });
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
-            let mass = size_of(&nodal.mass);
+            let mass = size_of(&nodal.inertias[0]);
             let inertia = mass * root(0);
             let natural = |j: usize| match root(j + 1) {
                 response if response > 0.0 => inertia / response,

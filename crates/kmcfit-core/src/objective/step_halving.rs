@@ -91,7 +91,7 @@ impl Problem {
             let Some(grid) = grid else {
                 return Ok(None);
             };
-            let Some(part) = experiment.halved(first..end, state, &grid) else {
+            let Some(part) = experiment.halved(first..end, state.clone(), &grid) else {
                 return Ok(None);
             };
             let system = System {
@@ -107,7 +107,7 @@ impl Problem {
                 excitation,
             };
             driven
-                .respond(EngineMode::Fastest, state, &mut response)
+                .respond(EngineMode::Fastest, &state, &mut response)
                 .map_err(|error| SimulationError {
                     node: error.node + 2 * first,
                     ..error
@@ -123,10 +123,10 @@ impl Problem {
             for (channel, predicted) in channels.filter(|(channel, _)| !channel.is_empty()) {
                 predicted.extend(channel.predict(view));
             }
-            state = State {
-                displacement: response.displacement(0)[part.nodes - 1],
-                velocity: response.velocity(0)[part.nodes - 1],
-            };
+            state = State::one(
+                response.displacement(0)[part.nodes - 1],
+                response.velocity(0)[part.nodes - 1],
+            );
             first = end;
         }
         Ok(Some(predictions))
@@ -141,7 +141,7 @@ fn halved(nodal: &NodalCoefficients, steps: Range<usize>) -> NodalCoefficients {
         pairs.chain(f.last().copied()).collect()
     };
     NodalCoefficients {
-        mass: finer(&nodal.mass),
+        inertias: vec![finer(&nodal.inertias[0])],
         coefficients: nodal.coefficients.iter().map(|f| finer(f)).collect(),
     }
 }
@@ -154,7 +154,7 @@ mod tests {
     };
     use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Waveform, Weighting};
     use crate::signal::{Interpolation, Signal, low_pass};
-    use crate::structure::Law;
+    use crate::structure::{Law, Structure};
     use crate::system::InputSample;
     use crate::system::Method;
 
@@ -200,10 +200,7 @@ mod tests {
         let between = (0..60)
             .map(|i| grid.start() + 0.15 * f64::from(i))
             .collect();
-        let state = State {
-            displacement: 0.3,
-            velocity: -1.0,
-        };
+        let state = State::one(0.3, -1.0);
         let record = Experiment {
             excitation: Some(input.on(&grid, NODES)),
             input,
@@ -214,7 +211,7 @@ mod tests {
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: vec![Law::Damping, Law::Stiffness],
+            structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
         };
         Problem::new(system, functions, vec![record]).expect("a problem")
     }

@@ -9,10 +9,10 @@ use std::ops::Range;
 pub struct Experiment {
     /// Name for reports.
     pub name: String,
-    /// Displacement and velocity at the first node; their starts where estimated.
+    /// State at the first node; starts where estimated.
     pub initial: State,
-    /// Scalar parameters of displacement and velocity at the first node, where estimated.
-    pub initial_parameters: [Option<usize>; 2],
+    /// Scalar parameters of the components of that state, where estimated.
+    pub initial_parameters: Vec<Option<usize>>,
     /// Excitation on the grid; `None` for a free response.
     pub excitation: Option<Excitation>,
     /// Input from which the excitation was sampled; empty where the excitation was given on the grid.
@@ -33,8 +33,8 @@ impl Experiment {
     pub fn free(name: impl Into<String>, initial: State, nodes: usize) -> Self {
         Self {
             name: name.into(),
+            initial_parameters: vec![None; initial.components().len()],
             initial,
-            initial_parameters: [None; 2],
             excitation: None,
             input: Input::default(),
             input_error: None,
@@ -60,11 +60,17 @@ impl Experiment {
 
     /// State at the first node, given the values `scalars` of all scalars.
     pub fn initial_state(&self, scalars: &[f64]) -> State {
-        let value = |estimated: Option<usize>, known: f64| estimated.map_or(known, |i| scalars[i]);
-        State {
-            displacement: value(self.initial_parameters[0], self.initial.displacement),
-            velocity: value(self.initial_parameters[1], self.initial.velocity),
-        }
+        let components = self
+            .initial_parameters
+            .iter()
+            .zip(self.initial.components());
+        let values = components.map(|(estimated, known)| estimated.map_or(*known, |i| scalars[i]));
+        State::from(values.collect::<Vec<f64>>())
+    }
+
+    /// True where no component of the state at the first node is estimated.
+    pub fn begins_known(&self) -> bool {
+        self.initial_parameters.iter().all(Option::is_none)
     }
 
     /// The steps `steps` and the samples within them before their filters, from the state `initial`, on a grid of half the step that
@@ -88,7 +94,7 @@ impl Experiment {
             excitation,
             nodes,
             initial,
-            initial_parameters: [None; 2],
+            initial_parameters: vec![None; self.initial_parameters.len()],
             ..self.clone()
         })
     }

@@ -37,7 +37,8 @@ impl InputError {
         (0..nodes).map(place).collect()
     }
 
-    fn place(&self, t: f64) -> (usize, f64) {
+    /// Index of the input sample before time `t` (s), at most the last but one, and the fraction of the way to the next one.
+    pub fn place(&self, t: f64) -> (usize, f64) {
         let later = self.times.partition_point(|time| *time <= t);
         let before = later.saturating_sub(1).min(self.times.len() - 2);
         let [left, right] = [self.times[before], self.times[before + 1]];

@@ -17,6 +17,7 @@ mod filter;
 mod fourier;
 mod frequency_response;
 mod interpolate;
+mod jumps;
 mod modes;
 mod onset;
 mod shape;
@@ -32,7 +33,8 @@ pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_p
 pub(crate) use fourier::RealTransform;
 pub use frequency_response::{Mobility, driven_oscillator, two_forced_modes};
 pub use interpolate::{Interpolation, Signal};
-pub use modes::two_modes;
+pub use jumps::jumps;
+pub use modes::{is_kept_up, two_modes};
 pub use onset::onset;
 pub use shape::{ExcitationShape, SweepLaw};
 pub use spacing::{even_spacing, median, median_spacing};

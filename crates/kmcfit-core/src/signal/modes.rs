@@ -1,7 +1,8 @@
-//! Modes of vibration in a free response, from its spectrum.
+//! Modes of vibration in a response without a measured input, from its spectrum.
 
 use super::Spectrum;
 use super::median;
+use crate::diagnostics::standard_deviation;
 
 /// Fewest values of a record.
 const FEWEST: usize = 256;
@@ -20,10 +21,72 @@ const WIDTH: f64 = 0.1;
 const HARMONICS: [f64; 4] = [2.0, 3.0, 4.0, 5.0];
 const HARMONIC: f64 = 0.05;
 
+/// Parts of a record whose sizes are compared, and the fewest periods in a part.
+const PARTS: usize = 16;
+const PERIODS: usize = 2;
+/// Size of the last quarter of a record relative to the first from which on it is no decay.
+const KEPT: f64 = 0.5;
+/// Smallest ratio of the mean density about the peak of a resonance to the median density.
+const RESONANT: f64 = 10.0;
+/// Ratio of the sizes of two parts from which on one is larger than the other.
+const LARGER: f64 = 1.2;
+/// Half the width of a line under the window, in frequency spacings, and the share of the energy from which on lines explain it.
+const LINE: usize = 2;
+const LINES: f64 = 0.75;
+
+/// True for a response that a random force keeps up: it does not decay, its size falls and rises again from part to part, and the one or two
+/// lines of slow decays do not explain its spectrum within half an octave of the peak. Responses of fewer than 32 periods are not judged.
+pub fn is_kept_up(values: &[f64], spacing: f64) -> bool {
+    let quarter = values.len() / 4;
+    if quarter < PARTS {
+        return false;
+    }
+    let size = |part: &[f64]| standard_deviation(part);
+    if size(&values[values.len() - quarter..]) < KEPT * size(&values[..quarter]) {
+        return false;
+    }
+    let sizes: Vec<f64> = (values.chunks_exact(values.len() / PARTS).take(PARTS))
+        .map(size)
+        .collect();
+    let changes = |is_change: &dyn Fn(f64, f64) -> bool| {
+        (1..PARTS).any(|i| sizes[..i].iter().any(|before| is_change(*before, sizes[i])))
+    };
+    if !changes(&|a, b| b > LARGER * a) || !changes(&|a, b| a > LARGER * b) {
+        return false;
+    }
+    let Some(spectrum) = Spectrum::of(values, spacing) else {
+        return false;
+    };
+    let density = spectrum.density();
+    let highest = |bins: &[f64]| (0..bins.len()).max_by(|a, b| bins[*a].total_cmp(&bins[*b]));
+    let Some(peak) = highest(density).filter(|peak| *peak >= PARTS * PERIODS) else {
+        return false;
+    };
+    // Noise alone has no resonance.
+    let width = (WIDTH * peak as f64) as usize;
+    let around = &density[peak - width..(peak + width + 1).min(density.len())];
+    if around.iter().sum::<f64>() < RESONANT * median(density) * around.len() as f64 {
+        return false;
+    }
+    let octave = [0.5f64.sqrt(), 2f64.sqrt()].map(|factor| (factor * peak as f64) as usize);
+    let mut near = density[octave[0]..octave[1].min(density.len())].to_vec();
+    let all: f64 = near.iter().sum();
+    for _ in 0..2 {
+        let top = highest(&near).unwrap_or_default();
+        let end = (top + LINE + 1).min(near.len());
+        near[top.saturating_sub(LINE)..end].fill(0.0);
+    }
+    near.iter().sum::<f64>() > (1.0 - LINES) * all
+}
+
 /// Frequencies (Hz) of two modes in the earlier half of a free response with samples `spacing` seconds apart, the stronger one first;
-/// `None` where there is one mode or the response is too short. A frequency that varies in time, and harmonics, are no modes.
+/// `None` where there is one mode or the response is too short. A frequency that varies in time, and harmonics, are no modes. One that a random
+/// force keeps up has many peaks: there the mean spectrum of its parts counts.
 pub fn two_modes(values: &[f64], spacing: f64) -> Option<[f64; 2]> {
-    let spectrum = Spectrum::of(&values[..values.len() / 2], spacing)?;
+    let spectrum = match is_kept_up(values, spacing) {
+        true => Spectrum::mean(values, spacing, PARTS),
+        false => Spectrum::of(&values[..values.len() / 2], spacing),
+    }?;
     let density = spectrum.density();
     (density.len() >= FEWEST / 4).then_some(())?;
     let floor = median(density);
@@ -91,5 +154,38 @@ mod tests {
         for (name, values) in [("one", one), ("rising", rising), ("hardening", hardening)] {
             assert_eq!(two_modes(&values, SPACING), None, "{name}");
         }
+    }
+
+    /// Slow decays, beats, growing and rising ones are no random motion; the response of an oscillator to pseudorandom kicks is.
+    #[test]
+    fn a_random_force_keeps_a_response_up() {
+        let free = [
+            series(|t| (-0.01 * t).exp() * (TAU * 2.0 * t).cos()),
+            series(|t| (-0.01 * t).exp() * ((TAU * 2.0 * t).cos() + 0.6 * (TAU * 2.2 * t).cos())),
+            series(|t| (0.05 * t).exp() * (TAU * 2.0 * t).cos()),
+            series(|t| (-0.01 * t).exp() * (TAU * (2.0 * t + 0.0125 * t * t)).cos()),
+        ];
+        for (i, values) in free.iter().enumerate() {
+            assert!(!is_kept_up(values, SPACING), "{i}");
+        }
+        let mut random = 12_345_u64;
+        let (mut y, mut v) = (0.0, 0.0);
+        let mut kicked = || {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            v += (random >> 40) as f64 / 16_777_216.0 - 0.5;
+            v -= SPACING * (0.5 * v + (TAU * 2.0).powi(2) * y);
+            y += SPACING * v;
+            y
+        };
+        let values: Vec<f64> = (0..20_000).map(|_| kicked()).collect();
+        let noise: Vec<f64> = values
+            .windows(2)
+            .map(|y| (1e6 * (y[1] - y[0])).fract())
+            .collect();
+        assert!(!is_kept_up(&noise, SPACING));
+        assert!(is_kept_up(&values, SPACING));
+        assert_eq!(two_modes(&values, SPACING), None);
     }
 }

@@ -81,6 +81,20 @@ impl Spectrum {
         })
     }
 
+    /// Mean of the spectra of `parts` parts and of those half a part later (Welch 1967); `None` as for [`of`](Self::of).
+    pub(super) fn mean(values: &[f64], spacing: f64, parts: usize) -> Option<Self> {
+        let half = values.len() / parts / 2;
+        let mut starts = (0..2 * parts - 1).map(|i| &values[i * half..(i + 2) * half]);
+        let mut mean = Self::of(starts.next()?, spacing)?;
+        for part in starts {
+            let density = Self::of(part, spacing)?.density;
+            (mean.density.iter_mut().zip(density)).for_each(|(sum, d)| *sum += d);
+        }
+        let count = (2 * parts - 1) as f64;
+        mean.density.iter_mut().for_each(|d| *d /= count);
+        Some(mean)
+    }
+
     /// Frequency spacing, Hz.
     pub fn resolution(&self) -> f64 {
         self.resolution

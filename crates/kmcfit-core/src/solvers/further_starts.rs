@@ -10,7 +10,7 @@ use super::executor::search;
 use super::fit::{Attempt, Fit};
 use super::observer::Observer;
 use super::rounds::{is_ended, with_round};
-use super::settings::{FitSettings, Solver, StartStrategy};
+use super::settings::{FitSettings, StartStrategy};
 use super::start_strategy::PROBING_ITERATIONS;
 use super::starts::scan_start;
 use super::termination::Status;
@@ -49,7 +49,7 @@ pub(super) fn with_further_starts(
     settings: &FitSettings,
     watch: &mut Observer,
 ) -> Result<Fit, SimulationError> {
-    let searches = settings.solver == Solver::GaussNewton && settings.stopping.has_test();
+    let searches = settings.has_several_starts() && settings.stopping.has_test();
     if !searches || problem.parameters() == 0 {
         return Ok(found);
     }

@@ -22,17 +22,19 @@ use crate::problem::Problem;
 use crate::record::{
     Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
 };
+use crate::scalar_search::root;
 use crate::step::SimulationError;
 use crate::system::{Grid, InputQuantity};
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// Largest number of rounds of fit and estimation.
 const ROUNDS: usize = 20;
 /// Change of the parameters, in standard errors, below which they are at rest.
 const AT_REST: f64 = 0.01;
-/// Largest factor by which a sigma changes in one estimation, and the halvings of the interval of its logarithm.
+/// Largest factor by which a sigma changes in one estimation, and the tolerance of its logarithm.
 const WIDEST: f64 = 1e3;
-const HALVINGS: usize = 30;
+const TOLERANCE: f64 = 1e-6;
 
 /// True if the input of some experiment has errors of a stated sigma.
 pub(super) fn has_input_errors(problem: &Problem) -> bool {
@@ -71,24 +73,25 @@ fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
     let mut next = measured.clone();
     let grid = next.system.grid;
     for e in 0..measured.experiments.len() {
-        let Some(effect) = effect(measured, evaluation, e) else {
+        let experiment = &measured.experiments[e];
+        let (Some(error), Some(channel)) =
+            (experiment.input_error.clone(), experiment.channels.first())
+        else {
             continue;
         };
+        let effect = input_error_effect(measured, evaluation, e, channel, &error);
         let predicted = &evaluation.predictions[e][0];
         let channel = &mut measured.parts_mut().experiments[e].channels[0];
-        *channel = with_sigma(channel, &effect, predicted, share);
-        let sigma = sigma_of(channel);
-        let effect = effect.scaled(1.0 / sigma);
+        *channel = with_sigma(channel, &effect, error.sigma, predicted, share);
         let experiment = &mut next.parts_mut().experiments[e];
         experiment.channels[0] = channel.clone();
-        let is_sensor = |error: &InputError| error.kind == InputErrorKind::Sensor;
-        if let Some(error) = experiment.input_error.clone().filter(is_sensor) {
-            let residuals = channel.residuals(predicted);
-            let normalised: Vec<f64> = residuals.map(|r| -r / sigma).collect();
-            let inputs = effect.smoothed(&normalised, error.times.len());
+        let effect = effect.with_ratio(error.sigma / sigma_of(channel));
+        if error.kind == InputErrorKind::Sensor {
+            let residuals: Vec<f64> = channel.residuals(predicted).map(|r| -r).collect();
+            let inputs = effect.smoothed(&residuals, error.times.len());
             let [gain, ..] = channel.sensor().values(&evaluation.scalars);
             let response = effect.response(&inputs).into_iter();
-            let response: Vec<f64> = response.map(|z| z * sigma / gain).collect();
+            let response: Vec<f64> = response.map(|z| z / gain).collect();
             add_to_input(experiment, &grid, &error, &inputs, response);
         }
         let channel = &mut experiment.channels[0];
@@ -135,15 +138,6 @@ fn sigma_of(channel: &Channel) -> f64 {
     channel.weighting().sigma(0).unwrap_or(1.0)
 }
 
-/// Effect of the errors of the input of experiment `e` on the samples of its channel, in the unit of the samples; `None` without errors
-/// or channel.
-fn effect(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<InputErrors> {
-    let experiment = &problem.experiments[e];
-    let error = experiment.input_error.as_ref()?;
-    let channel = experiment.channels.first()?;
-    Some(input_error_effect(problem, evaluation, e, channel, error))
-}
-
 /// Effect of errors of the input of experiment `e` on the samples of a channel, in the unit of the samples.
 pub(crate) fn input_error_effect(
     problem: &Problem,
@@ -156,9 +150,13 @@ pub(crate) fn input_error_effect(
     let derivatives = (view.driven()).input_derivatives(view.response, error.quantity);
     let steps: Vec<InputStep> = derivatives
         .into_iter()
-        .map(|[state, input]| InputStep { state, input })
+        .map(|[state, input]| InputStep {
+            state: DMatrix::from_fn(2, 2, |end, start| state[start][end]),
+            input: input.map(|by| DVector::from_row_slice(&by)),
+        })
         .collect();
     let [gain, ..] = channel.sensor().values(view.scalars);
+    let grid = &problem.system.grid;
     let is_acceleration = channel.kind() == ChannelKind::Acceleration;
     let rows: Vec<InputRow> = (0..channel.len())
         .map(|j| {
@@ -167,46 +165,48 @@ pub(crate) fn input_error_effect(
             let by_input = match error.quantity {
                 _ if !is_acceleration => 0.0,
                 InputQuantity::Force => {
-                    let mass = &view.nodal.mass;
+                    let mass = &view.nodal.inertias[0];
                     1.0 / (mass[i] * (1.0 - x) + mass[i + 1] * x)
                 }
                 // The sensor of absolute motion adds the acceleration of the base that the relative one loses.
                 InputQuantity::BaseAcceleration if channel.base().is_empty() => -1.0,
                 InputQuantity::BaseAcceleration => 0.0,
             };
+            let [y, v, next_y, next_v] = channel.sensed(view, j).states.map(|a| gain * a);
             InputRow {
                 step: i,
-                states: channel.sensed(view, j).states.map(|a| gain * a),
-                input: [gain * by_input * (1.0 - x), gain * by_input * x],
+                states: [[y, v], [next_y, next_v]].map(|by| DVector::from_row_slice(&by)),
+                input: gain * by_input,
+                place: error.place(grid.time(i) + x * grid.step()),
             }
         })
         .collect();
-    let places = error.places(&problem.system.grid, steps.len() + 1);
-    InputErrors::new(error.sigma, &steps, &places, &rows)
+    let places = error.places(grid, steps.len() + 1);
+    InputErrors::new(&steps, &places, &rows)
 }
 
 /// The channel with an estimated sigma at which `r^T C^-1 r` is the number of samples less the share of the parameters; a stated
 /// sigma stays.
-fn with_sigma(channel: &Channel, effect: &InputErrors, predicted: &[f64], share: f64) -> Channel {
+fn with_sigma(
+    channel: &Channel,
+    effect: &InputErrors,
+    stated: f64,
+    predicted: &[f64],
+    share: f64,
+) -> Channel {
     let Weighting::Estimated { sigma } = *channel.weighting() else {
         return channel.clone();
     };
     let residuals: Vec<f64> = channel.residuals(predicted).collect();
     let target = (1.0 - share) * residuals.len() as f64;
-    let excess = |sigma: f64| {
-        let normalised: Vec<f64> = residuals.iter().map(|r| r / sigma).collect();
-        let whitened = effect.scaled(1.0 / sigma).whiten(&normalised);
-        whitened.iter().map(|e| e * e).sum::<f64>() - target
+    // Nearly linear in the logarithm of sigma.
+    let excess = |log: f64| {
+        let sigma = log.exp();
+        let [squares, _] = effect.likelihood(stated / sigma, &residuals);
+        (squares / (sigma * sigma * target)).ln()
     };
-    let (mut low, mut high) = ((sigma / WIDEST).ln(), (sigma * WIDEST).ln());
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        match excess(middle.exp()) > 0.0 {
-            true => low = middle,
-            false => high = middle,
-        }
-    }
-    let sigma = (0.5 * (low + high)).exp();
+    let ends = [1.0 / WIDEST, WIDEST].map(|factor| (factor * sigma).ln());
+    let sigma = root(excess, ends, TOLERANCE).map_or(sigma, f64::exp);
     channel
         .clone()
         .with_weighting(Weighting::Estimated { sigma })

@@ -44,13 +44,15 @@ pub enum Initial {
     Functions,
     /// Minimum of the equation error of the samples.
     Data,
+    /// Start values of the functions, near an optimum: no other is tried.
+    Near,
 }
 
 impl Initial {
     /// Name in a model file.
     pub fn name(self) -> &'static str {
         match self {
-            Initial::Functions => "functions",
+            Initial::Functions | Initial::Near => "functions",
             Initial::Data => "data",
         }
     }
@@ -129,6 +131,13 @@ pub struct FitSettings {
     pub stopping: Stopping,
     /// Flag set by the application (Ctrl-C) to end the fit after the current iteration.
     pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+impl FitSettings {
+    /// True where further starting points are tried until a fit explains the record.
+    pub(super) fn has_several_starts(&self) -> bool {
+        self.solver == Solver::GaussNewton && self.initial != Initial::Near
+    }
 }
 
 impl Default for FitSettings {

@@ -100,7 +100,11 @@ impl Problem {
 
     /// `moved`, or where its mass is not positive the nearest point to `start` with positive mass, if one is feasible.
     fn with_mass(&self, start: &[f64], metric: &[f64], moved: Vec<f64>) -> Vec<f64> {
-        let positive = |theta: &[f64]| self.functions.nodal(theta).mass.iter().all(|m| *m > 0.0);
+        let positive = |theta: &[f64]| {
+            self.functions.nodal(theta).inertias[0]
+                .iter()
+                .all(|m| *m > 0.0)
+        };
         if positive(&moved) || !positive(start) {
             return moved;
         }
@@ -125,7 +129,7 @@ impl Problem {
     /// Constraints plus a positive mass at every node, relative to the mass of `start`.
     fn constraints_with_mass(&self, start: &[f64]) -> Constraints {
         let nodal = self.functions.nodal(start);
-        let largest = nodal.mass.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let largest = nodal.inertias[0].iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let least = POSITIVE * largest;
         let mut group = RowGroup::new("mass > 0");
         let parts = self.functions.iter().zip(self.functions.ranges());

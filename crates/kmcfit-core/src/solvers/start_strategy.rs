@@ -97,7 +97,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         settings: &'a FitSettings,
         watch: &'a mut Observer<'w>,
     ) -> Self {
-        let has_several = settings.solver == Solver::GaussNewton;
+        let has_several = settings.has_several_starts();
         let mut probing = settings.clone();
         if has_several && settings.stopping.has_test() {
             probing.stopping.iterations = settings.stopping.iterations.min(PROBING_ITERATIONS);
@@ -129,7 +129,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         let steps = can_truncate.then(|| truncated_steps(problem)).flatten();
         let clock = Instant::now();
         match (settings.initial, steps) {
-            (Initial::Functions, None) => Duration::ZERO,
+            (Initial::Near, _) | (Initial::Functions, None) => Duration::ZERO,
             (Initial::Functions, Some(steps)) => {
                 let found = truncated_start(problem, steps, start, settings, self.watch);
                 self.refer(found.referred);
@@ -157,7 +157,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
     fn strategies(&self) -> Vec<StartStrategy> {
         use StartStrategy::{EquationError, GrowingHorizon, StartValues};
         let first = match self.settings.initial {
-            Initial::Functions => [StartValues, EquationError],
+            Initial::Functions | Initial::Near => [StartValues, EquationError],
             Initial::Data => [EquationError, StartValues],
         };
         let truncated = self.truncated.iter().map(|(strategy, _)| *strategy);

@@ -40,14 +40,10 @@ pub fn predict_validation(
     let mut start = alone.start();
     let first = estimate_states(&alone).into_iter().next().flatten();
     if let Some(state) = first {
-        let values = [state.displacement, state.velocity];
-        for (index, value) in alone.experiments[0]
-            .initial_parameters
-            .into_iter()
-            .zip(values)
-        {
+        let indices = alone.experiments[0].initial_parameters.iter();
+        for (index, value) in indices.zip(state.components()) {
             if let Some(index) = index.filter(|i| scalars[*i].prior.is_none()) {
-                start[index] = value;
+                start[index] = *value;
             }
         }
     }

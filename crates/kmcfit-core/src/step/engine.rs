@@ -55,7 +55,7 @@ macro_rules! with_model {
     ($driven:expr, $model:ident => $call:expr) => {{
         let driven: Driven = $driven;
         let mut list = [Link::grounded(Law::Offset); MOST_ELEMENTS];
-        let laws = driven.system.terms.iter();
+        let laws = driven.system.laws().iter();
         let filled = list
             .iter_mut()
             .zip(laws)
@@ -99,7 +99,7 @@ impl<'a> Driven<'a> {
         } = self;
         let grid = &system.grid;
         let count = nodal.coefficients.len();
-        assert!(count <= system.terms.len(), "a term for each function");
+        assert!(count <= system.laws().len(), "a term for each function");
         assert!(
             nodal.functions().all(|f| f.len() == grid.nodes()),
             "functions on the nodes"
@@ -131,7 +131,7 @@ impl<'a> Driven<'a> {
         Model {
             tableau,
             list,
-            masses: [&self.nodal.mass],
+            masses: [&self.nodal.inertias[0]],
             coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
             drives: driven.map(|e| {
                 [Drive {
@@ -150,15 +150,15 @@ impl<'a> Driven<'a> {
     pub fn respond(
         self,
         mode: EngineMode,
-        initial: State,
+        initial: &State,
         trajectory: &mut Trajectory,
     ) -> Result<(), SimulationError> {
         let grid = &self.system.grid;
         require_positive_mass(grid, self.nodal)?;
         let nodes = trajectory.nodes();
         let in_order = mode.is_in_paper_order(self.system, self.excitation, nodes);
-        let is_linear = self.system.terms.iter().all(|law| law.is_linear());
-        let x = [[initial.displacement], [initial.velocity]];
+        let is_linear = self.system.laws().iter().all(|law| law.is_linear());
+        let x = [[initial.displacement(0)], [initial.velocity(0)]];
         let driven = self.require(nodes);
         if self.system.method == Method::ImplicitMidpoint {
             return driven.respond_assembled(initial, trajectory);
@@ -197,15 +197,13 @@ impl<'a> Driven<'a> {
         let [[displacement], [velocity]] = with_model!(driven, model => {
             simd::run(Adjoint { model, states, source, gradient })
         });
-        State {
-            displacement,
-            velocity,
-        }
+        State::one(displacement, velocity)
     }
 
     /// [`Driven::adjoint`] with the derivatives at the nodes.
     pub fn nodal_adjoint(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
-        let mut nodal = NodalCoefficients::zeros(self.nodal.mass.len(), self.system.terms.len());
+        let mut nodal =
+            NodalCoefficients::zeros(self.nodal.inertias[0].len(), self.system.laws().len());
         let gradient = CoefficientGradient::AtNodes(&mut nodal);
         let initial = self.adjoint(trajectory, source, gradient);
         SystemTangent { nodal, initial }
@@ -232,7 +230,10 @@ impl<'a> Driven<'a> {
     pub fn tangent(self, trajectory: &Trajectory, direction: &SystemTangent) -> Trajectory {
         let functions: Vec<&[f64]> = direction.nodal.functions().collect();
         let mut out = Trajectory::zeros(1, trajectory.nodes());
-        let mut x = [direction.initial.displacement, direction.initial.velocity];
+        let mut x = [
+            direction.initial.displacement(0),
+            direction.initial.velocity(0),
+        ];
         out.write(0, &x);
         self.each_step(trajectory, false, |i, maps, l| {
             let mut change = [0.0; 2];
@@ -284,7 +285,7 @@ impl System {
     pub fn forward(
         &self,
         nodal: &NodalCoefficients,
-        initial: State,
+        initial: &State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
         let mut trajectory = Trajectory::zeros(1, self.grid.nodes());
@@ -300,7 +301,7 @@ impl System {
 
 /// True for systems with damping and stiffness alone and the midpoint rule, whose trial steps are computed in lanes.
 pub(crate) fn is_linear_midpoint(system: &System) -> bool {
-    system.method == Method::Midpoint && system.terms == [Law::Damping, Law::Stiffness]
+    system.method == Method::Midpoint && system.laws() == [Law::Damping, Law::Stiffness]
 }
 
 /// Cost `J = sum_i w_i (y_i - observed_i)^2` of the free response by the midpoint rule with damping and stiffness, with the weights of
@@ -309,7 +310,7 @@ pub(crate) fn is_linear_midpoint(system: &System) -> bool {
 pub(crate) fn least_squares(
     system: &System,
     functions: [&[f64]; 3],
-    initial: State,
+    initial: &State,
     observed: &[f64],
     [inner, end]: [f64; 2],
     gradient: [&mut [f64]; 3],
@@ -329,7 +330,7 @@ pub(crate) fn least_squares(
     let (mut y, mut v) = (vec![0.0; nodes], vec![0.0; nodes]);
     simd::run(Linear {
         model,
-        x: [[initial.displacement], [initial.velocity]],
+        x: [[initial.displacement(0)], [initial.velocity(0)]],
         states: [[&mut y], [&mut v]],
     });
     let mut cost = 0.0;

@@ -57,12 +57,12 @@ pub(super) fn require_positive_mass(
     grid: &Grid,
     nodal: &NodalCoefficients,
 ) -> Result<(), SimulationError> {
-    if are_positive(&nodal.mass) {
+    if are_positive(&nodal.inertias[0]) {
         return Ok(());
     }
     let broken = |m: &f64| m.is_nan() || *m <= 0.0;
-    match nodal.mass.iter().position(broken) {
-        Some(node) => Err(at(grid, Cause::Mass, node, nodal.mass[node])),
+    match nodal.inertias[0].iter().position(broken) {
+        Some(node) => Err(at(grid, Cause::Mass, node, nodal.inertias[0][node])),
         None => Ok(()),
     }
 }

@@ -48,11 +48,11 @@ impl NodalObservations<'_> {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
         let y = eight(arithmetic, self.states.displacement(0), i);
         let v = eight(arithmetic, self.states.velocity(0), i);
-        let inverse_mass = one / eight(arithmetic, &self.nodal.mass, i);
+        let inverse_mass = one / eight(arithmetic, &self.nodal.inertias[0], i);
         let minus_inverse_mass = -inverse_mass;
         let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
-        for (j, law) in self.system.terms.iter().enumerate() {
+        for (j, law) in self.system.laws().iter().enumerate() {
             let p = match self.nodal.coefficients.get(j) {
                 Some(p) => eight(arithmetic, p, i),
                 None => zero,

@@ -183,11 +183,11 @@ fn acceleration(
         1.0 => f[i + 1],
         x => f[i] * (1.0 - x) + f[i + 1] * x,
     };
-    let mass = blend(&driven.nodal.mass);
+    let mass = blend(&driven.nodal.inertias[0]);
     let mut inertia = input.force / mass;
     let (mut by_y, mut by_v) = (0.0, 0.0);
     let mut by_function = [0.0; FUNCTIONS];
-    for (j, term) in driven.system.terms.iter().enumerate().rev() {
+    for (j, term) in driven.system.laws().iter().enumerate().rev() {
         let p = driven.nodal.coefficients.get(j);
         let p = p.map_or(0.0, |p| blend(p));
         let phi = term.phi(y.value, v.value);

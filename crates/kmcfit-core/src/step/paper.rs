@@ -59,7 +59,7 @@ impl<'a> AdjointEquation<'a> {
     ) -> Self {
         let dt = system.grid.step();
         let [c, k] = linearised_coefficients(system, nodal, trajectory);
-        let m = nodal.mass.as_slice();
+        let m = nodal.inertias[0].as_slice();
         let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
         let y = trajectory.displacement(0);
         let functions = [
@@ -134,13 +134,10 @@ impl<'a> AdjointEquation<'a> {
         let momentum_slope = m1 * z[0] + m * adjoint.first_slope;
         SystemTangent {
             nodal: NodalCoefficients {
-                mass: gradient(&acceleration),
-                coefficients: system.terms.iter().map(by_term).collect(),
+                inertias: vec![gradient(&acceleration)],
+                coefficients: system.laws().iter().map(by_term).collect(),
             },
-            initial: State {
-                displacement: c * z[0] - momentum_slope,
-                velocity: m * z[0],
-            },
+            initial: State::one(c * z[0] - momentum_slope, m * z[0]),
         }
     }
 }
@@ -157,12 +154,12 @@ fn linearised_coefficients<'a>(
     nodal: &'a NodalCoefficients,
     trajectory: &Trajectory,
 ) -> [Cow<'a, [f64]>; 2] {
-    if system.terms == [Law::Damping, Law::Stiffness] {
+    if system.laws() == [Law::Damping, Law::Stiffness] {
         return [0, 1].map(|j| Cow::Borrowed(nodal.coefficients[j].as_slice()));
     }
     let nodes = trajectory.nodes();
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
-    for (term, p) in system.terms.iter().zip(&nodal.coefficients) {
+    for (term, p) in system.laws().iter().zip(&nodal.coefficients) {
         for i in 0..nodes {
             let [by_y, by_v] =
                 term.slopes(trajectory.displacement(0)[i], trajectory.velocity(0)[i]);

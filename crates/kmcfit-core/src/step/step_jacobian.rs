@@ -65,7 +65,7 @@ fn by_state(maps: &Maps, l: usize, start: usize, end: usize) -> f64 {
 impl Driven<'_> {
     /// Linearises all steps about the node states `states`, which need not satisfy the equation of motion.
     pub fn step_jacobians(self, states: &Trajectory) -> StepJacobians {
-        let (components, functions) = (states.components(), self.system.terms.len() + 1);
+        let (components, functions) = (states.components(), self.system.laws().len() + 1);
         let size = (1 + components + 2 * functions) * components;
         let mut values = Vec::with_capacity(size * (states.nodes() - 1));
         self.each_step(states, false, |i, maps, l| {

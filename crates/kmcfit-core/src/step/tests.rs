@@ -6,7 +6,7 @@ use super::tangents::{ConstantPerturbation, Slot, TILE, Tangents};
 use super::{CoefficientGradient, EngineMode, SearchRay, Trajectory, least_squares, observe};
 use crate::record::ChannelKind;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
-use crate::structure::Law;
+use crate::structure::{Law, Structure};
 use crate::system::quadrature::trapezoid;
 use crate::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
@@ -43,7 +43,7 @@ impl Case {
     }
 
     fn response(&self) -> Trajectory {
-        let found = (self.system).forward(&self.nodal, self.initial, self.excitation());
+        let found = (self.system).forward(&self.nodal, &self.initial, self.excitation());
         found.expect("a response")
     }
 
@@ -157,7 +157,7 @@ fn case_of(
         let system = System {
             grid: Grid::new(0.0, step * (nodes - 1) as f64, nodes).expect("a grid"),
             method,
-            terms,
+            structure: Structure::one(terms),
         };
         let numbers = prop::collection::vec(-1.0..1.0f64, 3 * nodes);
         (functions, excitation, -3.0..3.0f64, -3.0..3.0f64, numbers).prop_map(
@@ -166,14 +166,11 @@ fn case_of(
                 Case {
                     system: system.clone(),
                     nodal: NodalCoefficients {
-                        mass: functions.next().expect("a mass"),
+                        inertias: vec![functions.next().expect("a mass")],
                         coefficients: functions.collect(),
                     },
                     excitation,
-                    initial: State {
-                        displacement,
-                        velocity,
-                    },
+                    initial: State::one(displacement, velocity),
                     numbers,
                 }
             },
@@ -221,7 +218,7 @@ impl Kernel for Observe<'_> {
 
 /// A direction for each lane of a group: random nodal values, or one number for a constant function.
 fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
-    let functions = 1 + case.system.terms.len();
+    let functions = 1 + case.system.laws().len();
     std::array::from_fn(|lane| {
         let mut nodal = NodalCoefficients::zeros(case.nodes(), functions - 1);
         for (f, values) in nodal.functions_mut().enumerate() {
@@ -233,10 +230,7 @@ fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
         }
         SystemTangent {
             nodal,
-            initial: State {
-                displacement: case.numbers[lane],
-                velocity: -0.5,
-            },
+            initial: State::one(case.numbers[lane], -0.5),
         }
     })
 }
@@ -244,12 +238,12 @@ fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
 /// All tangents of a group.
 fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory; LANES] {
     let directions = directions(case, holds);
-    let functions = 1 + case.system.terms.len();
+    let functions = 1 + case.system.laws().len();
     let slots = (0..functions).map(|function| Slot { group: 0, function });
     let row = |f: &dyn Fn(&SystemTangent) -> f64| directions.each_ref().map(f);
     let initial = [
-        row(&|d| d.initial.displacement),
-        row(&|d| d.initial.velocity),
+        row(&|d| d.initial.displacement(0)),
+        row(&|d| d.initial.velocity(0)),
     ];
     let mut tangents = Tangents::new(slots.collect(), &[initial]);
     let mut out = [(); LANES].map(|()| Trajectory::zeros(1, case.nodes()));
@@ -296,7 +290,7 @@ proptest! {
     #[test]
     fn fast_responses_agree_with_those_in_the_paper_s_order(case in any_case()) {
         let mut fast = Trajectory::zeros(1, case.nodes());
-        (case.driven().respond(EngineMode::Fastest, case.initial, &mut fast)).expect("a response");
+        (case.driven().respond(EngineMode::Fastest, &case.initial, &mut fast)).expect("a response");
         case.agree_responses(&fast, &case.response())?;
     }
 
@@ -304,7 +298,7 @@ proptest! {
     fn sums_are_those_of_the_derivatives_at_the_nodes(case in any_case()) {
         let (response, source) = (case.response(), case.source());
         let exact = case.driven().nodal_adjoint(&response, &source);
-        let mut sums = vec![0.0; 1 + case.system.terms.len()];
+        let mut sums = vec![0.0; 1 + case.system.laws().len()];
         let gradient = CoefficientGradient::Summed(&mut sums);
         let initial = case.driven().adjoint(&response, &source, gradient);
         prop_assert_eq!(initial, exact.initial);
@@ -327,7 +321,7 @@ proptest! {
         };
         let flat = |d: &SystemTangent| -> Vec<f64> {
             let functions = d.nodal.functions().flatten().copied();
-            functions.chain([d.initial.displacement, d.initial.velocity]).collect()
+            functions.chain([d.initial.displacement(0), d.initial.velocity(0)]).collect()
         };
         let all = |t: &Trajectory| [t.displacement(0), t.velocity(0)].concat();
         let [left, size] = dot(&all(&tangent), &all(&source));
@@ -350,14 +344,14 @@ proptest! {
         let exact = case.driven().nodal_adjoint(&response, &source);
         let mut gradient = nodal.clone();
         let [c, k] = gradient.coefficients.as_mut_slice() else { unreachable!("two terms") };
-        let functions = [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]];
+        let functions = [&nodal.inertias[0], &nodal.coefficients[0], &nodal.coefficients[1]];
         let found = least_squares(
             system,
             functions.map(Vec::as_slice),
-            case.initial,
+            &case.initial,
             &observed,
             weights,
-            [&mut gradient.mass, c, k],
+            [&mut gradient.inertias[0], c, k],
         );
         case.agree(&[found.expect("a long free record")], &[cost])?;
         for (found, exact) in gradient.functions().zip(exact.nodal.functions()) {
@@ -391,7 +385,7 @@ proptest! {
                     system, kind, nodal, case.excitation(), &states, place, surroundings,
                 );
                 let (lane, side) = (node - first, usize::from(place.fraction == 1.0));
-                let functions = 1 + system.terms.len();
+                let functions = 1 + system.laws().len();
                 let list = |value: f64, states: [f64; 2], functions: Vec<f64>| {
                     [vec![value], states.to_vec(), functions].concat()
                 };
@@ -416,10 +410,10 @@ proptest! {
         let (step, observed) = (system.grid.step(), case.series(0));
         let direction = [case.series(1), case.series(2), case.series(3)];
         let ray = SearchRay {
-            functions: [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]]
+            functions: [&nodal.inertias[0], &nodal.coefficients[0], &nodal.coefficients[1]]
                 .map(Vec::as_slice),
             direction: direction.each_ref().map(Vec::as_slice),
-            initial: *initial,
+            initial,
             samples: &observed,
             step,
         };
@@ -429,7 +423,7 @@ proptest! {
             for (values, direction) in nodal.functions_mut().zip(&direction) {
                 values.iter_mut().zip(direction).for_each(|(p, g)| *p -= a * g);
             }
-            system.forward(&nodal, *initial, None).map_or(f64::INFINITY, |response| {
+            system.forward(&nodal, &*initial, None).map_or(f64::INFINITY, |response| {
                 let pairs = response.displacement(0).iter().zip(&observed);
                 let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
                 trapezoid(&squares, step)

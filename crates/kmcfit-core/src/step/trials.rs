@@ -16,7 +16,7 @@ pub(crate) struct SearchRay<'a> {
     /// Search direction `g`, subtracted per unit of `a`.
     pub direction: [&'a [f64]; 3],
     /// State at the first node.
-    pub initial: State,
+    pub initial: &'a State,
     /// Displacement samples at the nodes, m.
     pub samples: &'a [f64],
     /// Step, s.
@@ -117,8 +117,8 @@ impl<const R: usize> Kernel for Trials<'_, R> {
         let zero = Eight::splat(arithmetic, 0.0);
         let last = ray.samples.len() - 1;
         let start: Pair<_, 1> = [
-            [Eight::splat(arithmetic, ray.initial.displacement)],
-            [Eight::splat(arithmetic, ray.initial.velocity)],
+            [Eight::splat(arithmetic, ray.initial.displacement(0))],
+            [Eight::splat(arithmetic, ray.initial.velocity(0))],
         ];
         let mut states = [start; R];
         let mut values = [OnRay([[zero; 3]; 2]); R];

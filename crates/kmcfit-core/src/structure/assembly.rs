@@ -18,7 +18,9 @@ pub struct Structure {
     coordinates: usize,
     supports: usize,
     inertias: Vec<Ends>,
-    elements: Vec<(Law, Ends)>,
+    laws: Vec<Law>,
+    /// Rows of the elements.
+    ends: Vec<Ends>,
     /// Places in a banded matrix, and values there, of `b b^T` for the row of each function.
     patterns: Vec<Vec<(usize, f64)>>,
     bandwidth: usize,
@@ -66,9 +68,10 @@ impl Structure {
         if coordinates == 0 {
             return Err(StructureError::NoCoordinate);
         }
+        let (laws, ends): (Vec<Law>, Vec<Ends>) = elements.into_iter().unzip();
         let mut has_inertia = vec![false; coordinates];
         let mut bandwidth = 0;
-        let rows = inertias.iter().chain(elements.iter().map(|(_, ends)| ends));
+        let rows = inertias.iter().chain(&ends);
         for (function, ends) in rows.clone().enumerate() {
             let beyond = ends
                 .entries()
@@ -108,22 +111,41 @@ impl Structure {
             coordinates,
             supports,
             inertias,
-            elements,
+            laws,
+            ends,
             patterns,
             bandwidth,
         })
     }
 
-    /// One coordinate with its mass and these elements.
-    pub(crate) fn one(elements: Vec<(Law, Ends)>) -> Self {
-        let patterns = vec![vec![(0, 1.0)]; 1 + elements.len()];
+    /// One coordinate with its mass, and an element of each law between it and the ground.
+    pub fn one(laws: Vec<Law>) -> Self {
         Self {
             coordinates: 1,
             supports: 0,
             inertias: vec![Ends::ground(0)],
-            elements,
-            patterns,
+            ends: vec![Ends::ground(0); laws.len()],
+            patterns: vec![vec![(0, 1.0)]; 1 + laws.len()],
+            laws,
             bandwidth: 0,
+        }
+    }
+
+    /// Adds elements between the first coordinate and the ground.
+    pub(crate) fn extend(&mut self, laws: impl IntoIterator<Item = Law>) {
+        for law in laws {
+            self.laws.push(law);
+            self.ends.push(Ends::ground(0));
+            self.patterns.push(vec![(0, 1.0)]);
+        }
+    }
+
+    /// Sets the width of Coulomb friction, m/s.
+    pub fn set_friction_width(&mut self, width: f64) {
+        for law in &mut self.laws {
+            if let Law::CoulombFriction { width: of_law } = law {
+                *of_law = width;
+            }
         }
     }
 
@@ -147,13 +169,18 @@ impl Structure {
         &self.inertias
     }
 
+    /// Laws of the elements.
+    pub fn laws(&self) -> &[Law] {
+        &self.laws
+    }
+
     /// Laws and rows of the elements.
-    pub fn elements(&self) -> &[(Law, Ends)] {
-        &self.elements
+    pub fn elements(&self) -> impl ExactSizeIterator<Item = (Law, &Ends)> {
+        self.laws.iter().copied().zip(&self.ends)
     }
 
     pub(crate) fn is_linear(&self) -> bool {
-        self.elements.iter().all(|(law, _)| law.is_linear())
+        self.laws.iter().all(|law| law.is_linear())
     }
 
     pub(crate) fn bandwidth(&self) -> usize {
@@ -185,10 +212,7 @@ impl Structure {
         let count = self.inertias.len();
         let sum = |wanted: &dyn Fn(usize) -> bool| {
             let mut matrix = DMatrix::zeros(n, n);
-            let rows = self
-                .inertias
-                .iter()
-                .chain(self.elements.iter().map(|(_, ends)| ends));
+            let rows = self.inertias.iter().chain(&self.ends);
             for (f, ends) in rows.enumerate().filter(|(f, _)| wanted(*f)) {
                 for (i, a) in free(ends, n) {
                     free(ends, n).for_each(|(j, b)| matrix[(i, j)] += functions[f] * a * b);
@@ -197,7 +221,7 @@ impl Structure {
             matrix
         };
         let mass = sum(&|f| f < count).cholesky()?;
-        let of_law = sum(&|f| f >= count && self.elements[f - count].0 == law);
+        let of_law = sum(&|f| f >= count && self.laws[f - count] == law);
         let half = mass.l().solve_lower_triangular(&of_law)?;
         let mut whole = mass.l().solve_lower_triangular(&half.transpose())?;
         whole = 0.5 * (&whole + whole.transpose());

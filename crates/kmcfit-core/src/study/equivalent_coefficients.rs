@@ -59,10 +59,10 @@ impl TargetResponse {
             .map(|f| f.at_nodes());
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
-            let terms = problem.system.terms.iter().zip(&nodal.coefficients);
+            let terms = problem.system.laws().iter().zip(&nodal.coefficients);
             let (y, v) = (response.displacement(0)[i], response.velocity(0)[i]);
             let resisting: f64 = terms.map(|(term, p)| p[i] * term.phi(y, v)).sum();
-            (force[i] - resisting) / nodal.mass[i]
+            (force[i] - resisting) / nodal.inertias[0][i]
         };
         let grid = problem.system.grid;
         let length = grid.step() * (nodes - 1) as f64;
@@ -181,7 +181,7 @@ pub fn equivalent_coefficients(
         places.map(|(line, t)| line.at(*t)[q] * size).collect()
     };
     Ok(NodalCoefficients {
-        mass: mass.to_vec(),
+        inertias: vec![mass.to_vec()],
         coefficients: vec![component(0, large_c), component(1, large_k)],
     })
 }

@@ -42,16 +42,13 @@ pub fn equivalent_systems(
     let Some(experiment) = problem.experiments.first() else {
         return Vec::new();
     };
-    let is_linear = problem.system.terms.iter().all(|t| t.is_linear());
+    let is_linear = problem.system.laws().iter().all(|t| t.is_linear());
     if !is_linear || experiment.nodes != problem.system.grid.nodes() {
         return Vec::new();
     }
     let response = TargetResponse::of(problem, evaluation, 0);
     let nodal = evaluation.nodal_of(experiment.coefficient_set);
-    let initial = State {
-        displacement: response.displacement[0],
-        velocity: response.velocity[0],
-    };
+    let initial = State::one(response.displacement[0], response.velocity[0]);
     let least = LEAST_STIFFNESS * nodal.coefficients[1].iter().copied().fold(0.0, f64::max);
     let find = |choice: Choice| {
         let damping = choice.damping;
@@ -63,7 +60,7 @@ pub fn equivalent_systems(
         )
         .ok()?;
         let excitation = experiment.excitation.as_ref();
-        let moved = problem.system.forward(&found, initial, excitation).ok()?;
+        let moved = problem.system.forward(&found, &initial, excitation).ok()?;
         let largest = (response.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
         let pairs = moved.displacement(0).iter().zip(&response.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
@@ -76,7 +73,7 @@ pub fn equivalent_systems(
         })
     };
     let choices = match choices {
-        [] => factors(&nodal.mass),
+        [] => factors(&nodal.inertias[0]),
         choices => choices.to_vec(),
     };
     let found: Vec<EquivalentSystem> = choices.into_iter().filter_map(find).collect();

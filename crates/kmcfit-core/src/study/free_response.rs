@@ -53,7 +53,7 @@ pub fn predict(
 ) -> Result<Vec<PredictedResponse>, SimulationError> {
     states
         .iter()
-        .map(|&state| {
+        .map(|state| {
             let response = system.forward(nodal, state, None)?;
             let truth = truth
                 .map(|truth| system.forward(truth, state, None))
@@ -69,7 +69,7 @@ pub fn predict(
 
 fn summarise(
     system: &System,
-    state: State,
+    state: &State,
     response: &Trajectory,
     truth: Option<&Trajectory>,
 ) -> PredictionSummary {
@@ -80,8 +80,8 @@ fn summarise(
         trapezoid(&squares, system.grid.step())
     };
     PredictionSummary {
-        displacement: state.displacement,
-        velocity: state.velocity,
+        displacement: state.displacement(0),
+        velocity: state.velocity(0),
         cost: truth.map(|t| integral(&|i| response.displacement(0)[i] - t.displacement(0)[i])),
         energy: truth.map(|t| integral(&|i| t.displacement(0)[i])),
         largest: Some((response.displacement(0).iter()).fold(0.0, |most, y| most.max(y.abs()))),

@@ -140,7 +140,7 @@ fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let nodes = grid.nodes();
     let zeros = vec![0.0; nodes];
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
-    let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
+    let mut experiment = Experiment::free(run.name.clone(), run.initial.clone(), nodes);
     experiment.excitation.clone_from(&run.excitation);
     seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen

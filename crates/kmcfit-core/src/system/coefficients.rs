@@ -1,51 +1,95 @@
 //! Nodal values of the coefficient functions, and the state of the system.
 
-/// Displacement (m) and velocity (m/s) at one time.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct State {
-    /// Displacement `y` in m.
-    pub displacement: f64,
-    /// Velocity `v = y'` in m/s.
-    pub velocity: f64,
+/// Displacements (m) of all coordinates, then their velocities (m/s), at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State(Vec<f64>);
+
+impl State {
+    /// Of one coordinate.
+    pub fn one(displacement: f64, velocity: f64) -> Self {
+        Self(vec![displacement, velocity])
+    }
+
+    /// At rest.
+    pub fn rest(coordinates: usize) -> Self {
+        Self(vec![0.0; 2 * coordinates])
+    }
+
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.0.len() / 2
+    }
+
+    /// Displacements, then velocities.
+    pub fn components(&self) -> &[f64] {
+        &self.0
+    }
+
+    /// As [`State::components`], mutable.
+    pub fn components_mut(&mut self) -> &mut [f64] {
+        &mut self.0
+    }
+
+    /// Displacement of a coordinate, m.
+    pub fn displacement(&self, coordinate: usize) -> f64 {
+        self.0[coordinate]
+    }
+
+    /// Velocity of a coordinate, m/s.
+    pub fn velocity(&self, coordinate: usize) -> f64 {
+        self.0[self.coordinates() + coordinate]
+    }
 }
 
-/// Nodal values of the mass and of each term's coefficient function.
+impl From<Vec<f64>> for State {
+    fn from(components: Vec<f64>) -> Self {
+        Self(components)
+    }
+}
+
+/// Nodal values of the functions of a structure: its inertias, then the coefficients of its elements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalCoefficients {
-    /// Mass at the nodes, kg.
-    pub mass: Vec<f64>,
-    /// Nodal values of one coefficient function per [`Law`](super::Law), in the system's order. The coefficients of the last terms
-    /// are zero in derivatives if there are fewer functions than terms.
+    /// Nodal values of each inertia, kg.
+    pub inertias: Vec<Vec<f64>>,
+    /// Nodal values of one coefficient per element, in the structure's order. The coefficients of the last elements are zero in derivatives
+    /// if there are fewer functions than elements.
     pub coefficients: Vec<Vec<f64>>,
 }
 
 impl NodalCoefficients {
-    /// Zero coefficients: `nodes` nodes, `terms` terms.
-    pub fn zeros(nodes: usize, terms: usize) -> Self {
+    /// Zero values of one inertia and `coefficients` elements at `nodes` nodes.
+    pub fn zeros(nodes: usize, coefficients: usize) -> Self {
         Self {
-            mass: vec![0.0; nodes],
+            inertias: vec![vec![0.0; nodes]],
             // One by one: zeroed memory comes from the operating system, copies would be written.
-            coefficients: (0..terms).map(|_| vec![0.0; nodes]).collect(),
+            coefficients: (0..coefficients).map(|_| vec![0.0; nodes]).collect(),
         }
     }
 
-    /// The mass and the coefficients as one list of functions, mass first.
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.inertias[0].len()
+    }
+
+    /// All functions as one list, inertias first.
     pub fn functions(&self) -> impl Iterator<Item = &[f64]> {
-        std::iter::once(self.mass.as_slice()).chain(self.coefficients.iter().map(Vec::as_slice))
+        let all = self.inertias.iter().chain(&self.coefficients);
+        all.map(Vec::as_slice)
     }
 
     /// Function `f` of that list.
     #[inline(always)]
     pub(crate) fn function_mut(&mut self, f: usize) -> &mut Vec<f64> {
-        match f {
-            0 => &mut self.mass,
-            f => &mut self.coefficients[f - 1],
+        match f.checked_sub(self.inertias.len()) {
+            None => &mut self.inertias[f],
+            Some(f) => &mut self.coefficients[f],
         }
     }
 
     /// As [`NodalCoefficients::functions`], mutable.
     pub fn functions_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        std::iter::once(&mut self.mass).chain(self.coefficients.iter_mut())
+        self.inertias.iter_mut().chain(&mut self.coefficients)
     }
 }
 

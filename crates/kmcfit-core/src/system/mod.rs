@@ -16,40 +16,36 @@ pub use grid::{Grid, TimePoint, round_time};
 pub use input::{Excitation, InputQuantity, InputSample, StageSamples};
 pub use method::Method;
 
-use crate::structure::{Law, MOST_ELEMENTS};
+use crate::structure::{Law, MOST_ELEMENTS, Structure};
 
 /// Largest number of functions of a system: the mass and one per term.
 pub(crate) const FUNCTIONS: usize = MOST_ELEMENTS + 1;
 
-/// Grid, integrator and force terms of a single-degree-of-freedom system; its coefficients are a [`NodalCoefficients`].
+/// Grid, integrator and structure; the values of its functions are a [`NodalCoefficients`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct System {
     /// Time nodes.
     pub grid: Grid,
     /// Integrator.
     pub method: Method,
-    /// Force terms, in the order of [`NodalCoefficients::coefficients`].
-    pub terms: Vec<Law>,
+    /// Inertias and elements.
+    pub structure: Structure,
 }
 
 impl System {
-    /// Width of Coulomb friction, m/s; `None` without it.
-    pub fn friction_width(&self) -> Option<f64> {
-        self.terms.iter().find_map(Law::friction_width)
+    /// Laws of the elements.
+    pub fn laws(&self) -> &[Law] {
+        self.structure.laws()
     }
 
-    /// Sets the width of Coulomb friction, m/s.
-    pub fn set_friction_width(&mut self, width: f64) {
-        for term in &mut self.terms {
-            if let Law::CoulombFriction { width: of_term } = term {
-                *of_term = width;
-            }
-        }
+    /// Width of Coulomb friction, m/s; `None` without it.
+    pub fn friction_width(&self) -> Option<f64> {
+        self.laws().iter().find_map(Law::friction_width)
     }
 
     /// True if the response is linear in the initial state and there is no excitation.
     pub fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
         let is_free = || excitation.is_none_or(Excitation::is_zero);
-        self.terms.iter().all(|term| term.is_linear()) && is_free()
+        self.structure.is_linear() && is_free()
     }
 }

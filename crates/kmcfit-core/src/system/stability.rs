@@ -26,12 +26,12 @@ impl System {
     /// Largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s; nodes where it is not finite are omitted.
     fn largest_rate(&self, nodal: &NodalCoefficients) -> f64 {
         let of = |wanted: Law| {
-            let index = self.terms.iter().position(|term| *term == wanted);
+            let index = self.laws().iter().position(|term| *term == wanted);
             index.and_then(|index| nodal.coefficients.get(index))
         };
         let (damping, stiffness) = (of(Law::Damping), of(Law::Stiffness));
         let value = |f: Option<&Vec<f64>>, i: usize| f.map_or(0.0, |f| f[i]);
-        let rates = (nodal.mass.iter().enumerate())
+        let rates = (nodal.inertias[0].iter().enumerate())
             .map(|(i, m)| rate(*m, value(damping, i), value(stiffness, i)));
         rates.filter(|rate| rate.is_finite()).fold(0.0, f64::max)
     }
@@ -50,19 +50,20 @@ fn rate(m: f64, c: f64, k: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::structure::Structure;
     use crate::system::Grid;
 
     fn system(method: Method) -> System {
         System {
             grid: Grid::new(0.0, 2.0, 101).unwrap(),
             method,
-            terms: vec![Law::Damping, Law::Stiffness],
+            structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
         }
     }
 
     fn constant(m: f64, c: f64, k: f64) -> NodalCoefficients {
         NodalCoefficients {
-            mass: vec![m; 101],
+            inertias: vec![vec![m; 101]],
             coefficients: vec![vec![c; 101], vec![k; 101]],
         }
     }

@@ -30,7 +30,7 @@ impl Bessel {
 
 /// Displacement and velocity at `t` of `m y'' + c y' + k y = 0`.
 pub fn constant_coefficients((m, c, k): (f64, f64, f64), initial: State, t: f64) -> (f64, f64) {
-    let (y0, v0) = (initial.displacement, initial.velocity);
+    let (y0, v0) = (initial.displacement(0), initial.velocity(0));
     let decay = c / (2.0 * m);
     let discriminant = decay * decay - k / m;
     let envelope = (-decay * t).exp();

@@ -13,7 +13,7 @@ use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Pa
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 
 use std::path::{Path, PathBuf};
@@ -21,26 +21,25 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 pub const DURATION: f64 = 25.0;
-pub const INITIAL: State = State {
-    displacement: 3.3,
-    velocity: 1.0,
-};
+pub fn initial() -> State {
+    State::one(3.3, 1.0)
+}
 
 pub fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
 /// The system that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
 pub fn paper_system(nodes: usize) -> NodalCoefficients {
-    let mass = (0..nodes)
+    let mass: Vec<f64> = (0..nodes)
         .map(|i| 1.0 - 0.5 * (i + 1) as f64 / nodes as f64)
         .collect();
     NodalCoefficients {
-        mass,
+        inertias: vec![mass],
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     }
 }
@@ -50,7 +49,7 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let system = system(nodes, Method::Midpoint);
     let step = system.grid.step();
     let observed = system
-        .forward(&paper_system(nodes), INITIAL, None)
+        .forward(&paper_system(nodes), &initial(), None)
         .unwrap()
         .displacement(0)
         .to_vec();
@@ -66,7 +65,7 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         .collect();
     let weighting = Weighting::Integral { spacing: step };
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &system.grid);
-    let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
+    let experiment = Experiment::free("free decay", initial(), nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
     Problem::new(system, functions, vec![experiment]).unwrap()
 }
@@ -115,7 +114,7 @@ pub fn noisy(system: &System, nodal: &NodalCoefficients, sigma: f64, seed: u64) 
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let response = system.forward(nodal, INITIAL, None).unwrap();
+    let response = system.forward(nodal, &initial(), None).unwrap();
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
     response
         .displacement(0)
@@ -124,7 +123,7 @@ pub fn noisy(system: &System, nodal: &NodalCoefficients, sigma: f64, seed: u64) 
         .collect()
 }
 
-/// A problem over `DURATION` from `INITIAL` with the given functions and samples at all nodes.
+/// A problem over `DURATION` from `initial()` with the given functions and samples at all nodes.
 pub fn problem_of(
     system: System,
     list: Vec<CoefficientFunction>,
@@ -137,7 +136,7 @@ pub fn problem_of(
         None => Weighting::Integral { spacing: step },
     };
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &system.grid);
-    let experiment = Experiment::free("free decay", INITIAL, nodes).with_channel(channel);
+    let experiment = Experiment::free("free decay", initial(), nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
     Problem::new(system, functions, vec![experiment]).unwrap()
 }

@@ -57,15 +57,15 @@ impl Truth<'_> {
             values.resize(steps, [0.0; 3]);
             values
         };
-        let terms = self.system.terms.iter().map(|term| response(*term));
+        let terms = self.system.laws().iter().map(|term| response(*term));
         Record {
             method: self.system.method,
             dt: self.system.grid.step(),
-            mass: self.nodal.mass.clone(),
+            mass: self.nodal.inertias[0].clone(),
             terms: terms.zip(self.nodal.coefficients.iter().cloned()).collect(),
             force: part(&|e| e.force.clone()),
             base: part(&|e| e.base.clone()),
-            initial: (self.initial.displacement, self.initial.velocity),
+            initial: (self.initial.displacement(0), self.initial.velocity(0)),
         }
     }
 }

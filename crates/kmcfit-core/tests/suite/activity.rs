@@ -17,10 +17,10 @@ const NODES: usize = 101;
 fn capped(cap: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
-        mass: vec![1.0; NODES],
+        inertias: vec![vec![1.0; NODES]],
         coefficients: vec![vec![0.8; NODES], vec![1.0; NODES]],
     };
-    let observed = system.forward(&truth, common::INITIAL, None).unwrap();
+    let observed = system.forward(&truth, &common::initial(), None).unwrap();
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),

@@ -10,7 +10,7 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::objective::{Evaluation, GradientKind};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{
     Excitation, Grid, InputSample, Method, StageSamples, State, System,
 };
@@ -203,15 +203,12 @@ impl Case {
         let functions = Parameterization::new(list, nodes, grid.step())
             .unwrap()
             .with_scalars(scalars);
-        let initial = State {
-            displacement: self.initial[0],
-            velocity: self.initial[1],
-        };
+        let initial = State::one(self.initial[0], self.initial[1]);
         let mut experiment = Experiment::free("all", initial, nodes).with_excitation(Excitation {
             force: Some(StageSamples::new(self.force.clone())),
             base: Some(StageSamples::new(self.base.clone())),
         });
-        experiment.initial_parameters = [Some(0), Some(1)];
+        experiment.initial_parameters = vec![Some(0), Some(1)];
         for (n, samples) in self.channels.iter().enumerate() {
             let time = |(i, x): &(usize, f64)| (*i as f64 + x) * grid.step();
             let times = samples.places.iter().map(time).collect();
@@ -245,7 +242,7 @@ impl Case {
         let system = System {
             grid,
             method: self.method,
-            terms: TERMS.iter().map(|(_, term, _)| *term).collect(),
+            structure: Structure::one(TERMS.iter().map(|(_, term, _)| *term).collect()),
         };
         Problem::new(system, functions, vec![experiment]).unwrap()
     }

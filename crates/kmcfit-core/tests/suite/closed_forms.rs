@@ -3,14 +3,14 @@
 use crate::common;
 
 use crate::common::closed_form::{Bessel, constant_coefficients};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 
 fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
@@ -20,10 +20,10 @@ fn bessel_error(nodes: usize, method: Method) -> f64 {
     let exact = Bessel::PAPER;
     let times = system.grid.times();
     let nodal = NodalCoefficients {
-        mass: times.iter().map(|t| exact.mass(*t)).collect(),
+        inertias: vec![times.iter().map(|t| exact.mass(*t)).collect()],
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
-    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, &common::initial(), None).unwrap();
     let errors = times.iter().zip(response.displacement(0));
     errors.fold(0.0f64, |most, (t, y)| {
         most.max((y - exact.displacement(*t)).abs())
@@ -72,23 +72,20 @@ fn constant_coefficients_converge_with_the_order_of_the_stepper() {
         (0.5, 0.0, 7.0),
         (1.0, -0.2, 2.0),
     ];
-    let initial = State {
-        displacement: -0.7,
-        velocity: 1.3,
-    };
+    let initial = State::one(-0.7, 1.3);
     for (m, c, k) in nodal_sets {
         for method in [Method::Midpoint, Method::Rk4] {
             let error = |nodes: usize| {
                 let system = system(nodes, 10.0, method);
                 let nodal = NodalCoefficients {
-                    mass: vec![m; nodes],
+                    inertias: vec![vec![m; nodes]],
                     coefficients: vec![vec![c; nodes], vec![k; nodes]],
                 };
-                let response = system.forward(&nodal, initial, None).unwrap();
+                let response = system.forward(&nodal, &initial, None).unwrap();
                 let times = system.grid.times();
                 let exact = times
                     .iter()
-                    .map(|t| constant_coefficients((m, c, k), initial, *t));
+                    .map(|t| constant_coefficients((m, c, k), initial.clone(), *t));
                 let errors = exact.zip(response.displacement(0).iter().zip(response.velocity(0)));
                 errors.fold(0.0f64, |most, ((ye, ve), (y, v))| {
                     most.max((y - ye).abs()).max((v - ve).abs())

@@ -9,7 +9,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::qp::{ConicStatus, project};
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::StartProjection;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Grid, Method, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -372,12 +372,9 @@ fn problem(functions: Parameterization) -> Problem {
     let system = System {
         grid: grid(),
         method: Method::Midpoint,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
-    let initial = State {
-        displacement: 1.0,
-        velocity: 0.0,
-    };
+    let initial = State::one(1.0, 0.0);
     let experiment = Experiment::free("none", initial, system.grid.nodes());
     Problem::new(system, functions, vec![experiment]).unwrap()
 }

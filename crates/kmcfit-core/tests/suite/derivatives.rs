@@ -7,7 +7,7 @@ use crate::common::reference::{Inputs, response};
 use kmcfit_core::internals::objective::{Evaluation, GradientKind};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::step::{Driven, Trajectory, continuous_adjoint};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, SystemTangent,
@@ -48,7 +48,7 @@ impl Case {
         System {
             grid: Grid::new(0.0, 0.1 * (nodes - 1) as f64, nodes).unwrap(),
             method: self.method,
-            terms: vec![Law::Damping, Law::Stiffness],
+            structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
         }
     }
 
@@ -78,7 +78,7 @@ impl Case {
         let system = self.system();
         let excitation = Excitation::force_at_nodes(&self.force);
         let force = Some(&excitation);
-        let response = system.forward(&self.nodal, self.initial, force).unwrap();
+        let response = system.forward(&self.nodal, &self.initial, force).unwrap();
         let source = self.source(&response);
         discrete_adjoint(&system, &self.nodal, force, &response, &source)
     }
@@ -92,20 +92,23 @@ impl Case {
             Dual64::new(*x, eps)
         };
         let inputs = Inputs {
-            mass: self.nodal.mass.iter().map(&mut dual).collect(),
+            mass: self.nodal.inertias[0].iter().map(&mut dual).collect(),
             damping: self.nodal.coefficients[0].iter().map(&mut dual).collect(),
             stiffness: self.nodal.coefficients[1].iter().map(&mut dual).collect(),
             force: self.force.iter().map(|f| Dual64::from(*f)).collect(),
         };
-        let y0 = dual(&self.initial.displacement);
-        let v0 = dual(&self.initial.velocity);
+        let y0 = dual(&self.initial.displacement(0));
+        let v0 = dual(&self.initial.velocity(0));
         self.cost(&inputs, y0, v0).eps
     }
 }
 
 fn flatten(gradient: &SystemTangent) -> Vec<f64> {
     let mut flat: Vec<f64> = gradient.nodal.functions().flatten().copied().collect();
-    flat.extend([gradient.initial.displacement, gradient.initial.velocity]);
+    flat.extend([
+        gradient.initial.displacement(0),
+        gradient.initial.velocity(0),
+    ]);
     flat
 }
 
@@ -125,14 +128,11 @@ fn case() -> impl Strategy<Value = Case> {
             .prop_map(move |(mass, c, k, force, (y0, v0), weights)| Case {
                 method,
                 nodal: NodalCoefficients {
-                    mass,
+                    inertias: vec![mass],
                     coefficients: vec![c, k],
                 },
                 force,
-                initial: State {
-                    displacement: y0,
-                    velocity: v0,
-                },
+                initial: State::one(y0, v0),
                 weights,
             })
     })
@@ -156,15 +156,15 @@ proptest! {
         let system = case.system();
         let excitation = Excitation::force_at_nodes(&case.force);
         let force = Some(&excitation);
-        let response = system.forward(&case.nodal, case.initial, force).unwrap();
+        let response = system.forward(&case.nodal, &case.initial, force).unwrap();
         // A direction and weights of the right length, taken from an unrelated case.
         let cut = |f: &[f64]| -> Vec<f64> {
             f.iter().cycle().take(case.force.len()).copied().collect()
         };
         let direction = SystemTangent {
             nodal: NodalCoefficients {
-                mass: cut(&other.nodal.coefficients[0]),
-                coefficients: vec![cut(&other.nodal.mass), cut(&other.force)],
+                inertias: vec![cut(&other.nodal.coefficients[0])],
+                coefficients: vec![cut(&other.nodal.inertias[0]), cut(&other.force)],
             },
             initial: other.initial,
         };
@@ -190,15 +190,15 @@ proptest! {
     fn the_forward_solve_is_the_textbook_one(case in case()) {
         let system = case.system();
         let ours = system
-            .forward(&case.nodal, case.initial, Some(&Excitation::force_at_nodes(&case.force)))
+            .forward(&case.nodal, &case.initial, Some(&Excitation::force_at_nodes(&case.force)))
             .unwrap();
         let inputs = Inputs {
-            mass: case.nodal.mass.clone(),
+            mass: case.nodal.inertias[0].clone(),
             damping: case.nodal.coefficients[0].clone(),
             stiffness: case.nodal.coefficients[1].clone(),
             force: case.force.clone(),
         };
-        let start = (case.initial.displacement, case.initial.velocity);
+        let start = (case.initial.displacement(0), case.initial.velocity(0));
         let other = response(case.method, &inputs, start, system.grid.step());
         let largest = other.iter().fold(0.0f64, |m, s| m.max(s.0.abs()).max(s.1.abs()));
         for (i, (y, v)) in other.iter().enumerate() {
@@ -331,18 +331,18 @@ fn initial_gradients(nodes: usize, is_nonlinear: bool) -> [State; 2] {
     let times = system.grid.times();
     let of = |f: fn(f64) -> f64| -> Vec<f64> { times.iter().map(|t| f(*t)).collect() };
     let mut nodal = NodalCoefficients {
-        mass: of(|t| 2.5 + 0.4 * (0.5 * t).sin()),
+        inertias: vec![of(|t| 2.5 + 0.4 * (0.5 * t).sin())],
         coefficients: vec![of(|t| 0.3 + 0.01 * t), of(|t| 1.5 - 0.2 * (0.3 * t).cos())],
     };
     if is_nonlinear {
-        system.terms.push(Law::CubicStiffness);
-        system.terms.push(Law::QuadraticDamping);
+        let laws = [system.laws(), &[Law::CubicStiffness, Law::QuadraticDamping]].concat();
+        system.structure = Structure::one(laws);
         nodal
             .coefficients
             .push(of(|t| 0.2 + 0.05 * (0.4 * t).sin()));
         nodal.coefficients.push(of(|t| 0.02 + 0.001 * t));
     }
-    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, &common::initial(), None).unwrap();
     let observed = of(|t| (0.7 * t).cos());
     let weights = trapezoid_weights(nodes, system.grid.step());
     let pairs = response.displacement(0).iter().zip(&observed);
@@ -359,8 +359,8 @@ fn assert_initial_gradients_converge(is_nonlinear: bool, limit: f64) {
     let errors = [2000, 4000, 8000].map(|nodes| {
         let [found, exact] = initial_gradients(nodes, is_nonlinear);
         [
-            (found.displacement / exact.displacement - 1.0).abs(),
-            (found.velocity / exact.velocity - 1.0).abs(),
+            (found.displacement(0) / exact.displacement(0) - 1.0).abs(),
+            (found.velocity(0) / exact.velocity(0) - 1.0).abs(),
         ]
     });
     for which in [0, 1] {

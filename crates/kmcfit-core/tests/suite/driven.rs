@@ -4,7 +4,7 @@
 use crate::common::closed_form::constant_coefficients;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::step::observe;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
     TimePoint,
@@ -15,16 +15,15 @@ const METHODS: [Method; 2] = [Method::Midpoint, Method::Rk4];
 const M: f64 = 2.0;
 const C: f64 = 0.6;
 const K: f64 = 18.0;
-const REST: State = State {
-    displacement: 0.0,
-    velocity: 0.0,
-};
+fn rest() -> State {
+    State::one(0.0, 0.0)
+}
 
 fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
@@ -33,7 +32,7 @@ fn constants(nodes: usize, values: &[f64]) -> NodalCoefficients {
         panic!("a mass")
     };
     NodalCoefficients {
-        mass: vec![*mass; nodes],
+        inertias: vec![vec![*mass; nodes]],
         coefficients: rest.iter().map(|p| vec![*p; nodes]).collect(),
     }
 }
@@ -101,7 +100,7 @@ fn a_harmonic_force_gives_the_steady_state_of_the_textbook() {
                 let grid = system.grid;
                 let force = sampled(&grid, |t| 5.0 * (w * t).cos());
                 let response = system
-                    .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
+                    .forward(&constants(nodes, &[M, C, K]), &rest(), Some(&pushed(force)))
                     .unwrap();
                 let settled = nodes * 5 / 6;
                 let (amplitude, phase) = tone(
@@ -141,7 +140,7 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                         base: Some(sampled(&grid, |t| -w * w * (w * t).cos())),
                     };
                     let nodal = constants(nodes, &[M, C, K]);
-                    let response = system.forward(&nodal, REST, Some(&excitation)).unwrap();
+                    let response = system.forward(&nodal, &rest(), Some(&excitation)).unwrap();
                     let settled: Vec<usize> = (nodes * 5 / 6..nodes).collect();
                     let times: Vec<f64> = settled.iter().map(|i| grid.time(*i)).collect();
                     let relative = settled.iter().map(|i| {
@@ -173,10 +172,7 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
 
 /// Displacement of `m y'' + c y' + k y = f0` from rest.
 fn step_response(t: f64) -> f64 {
-    let from = State {
-        displacement: -1.0 / K,
-        velocity: 0.0,
-    };
+    let from = State::one(-1.0 / K, 0.0);
     constant_coefficients((M, C, K), from, t).0 + 1.0 / K
 }
 
@@ -190,7 +186,7 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
             let on = |i: usize| [f64::from(u8::from((first..last).contains(&i))); 3];
             let force = StageSamples::new((0..nodes - 1).map(on));
             let response = system
-                .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
+                .forward(&constants(nodes, &[M, C, K]), &rest(), Some(&pushed(force)))
                 .unwrap();
             let after = |t: f64| if t > 0.0 { step_response(t) } else { 0.0 };
             let times = system
@@ -221,10 +217,7 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
             return during(t).0;
         }
         let (displacement, velocity) = during(2.0);
-        let left = State {
-            displacement,
-            velocity,
-        };
+        let left = State::one(displacement, velocity);
         constant_coefficients((M, 0.0, K), left, t - 2.0).0
     };
     for method in METHODS {
@@ -234,7 +227,11 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
                 if t < 2.0 + 1e-9 { (w * t).sin() } else { 0.0 }
             });
             let response = system
-                .forward(&constants(nodes, &[M, 0.0, K]), REST, Some(&pushed(force)))
+                .forward(
+                    &constants(nodes, &[M, 0.0, K]),
+                    &rest(),
+                    Some(&pushed(force)),
+                )
                 .unwrap();
             let times = system
                 .grid
@@ -252,13 +249,10 @@ fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     // A step 1/20 of the time that the speed takes to cross the narrowest width.
     let nodes = 40_001;
     let mut system = system(nodes, 2.0 * PI * 3.2, Method::Rk4);
-    system.terms = vec![Law::Stiffness, Law::CoulombFriction { width }];
-    let initial = State {
-        displacement: 1.0,
-        velocity: 0.0,
-    };
+    system.structure = Structure::one(vec![Law::Stiffness, Law::CoulombFriction { width }]);
+    let initial = State::one(1.0, 0.0);
     let response = system
-        .forward(&constants(nodes, &[1.0, 1.0, friction]), initial, None)
+        .forward(&constants(nodes, &[1.0, 1.0, friction]), &initial, None)
         .unwrap();
     let (y, v) = (response.displacement(0), response.velocity(0));
     let turns = (1..nodes - 1).filter(|i| v[*i] * v[i + 1] <= 0.0);
@@ -335,10 +329,10 @@ fn samples_between_nodes_have_the_order_of_the_stepper() {
             ChannelKind::Acceleration => -w * w * c / impedance,
         }
     };
-    let initial = State {
-        displacement: exact(ChannelKind::Displacement, 0.0),
-        velocity: exact(ChannelKind::Velocity, 0.0),
-    };
+    let initial = State::one(
+        exact(ChannelKind::Displacement, 0.0),
+        exact(ChannelKind::Velocity, 0.0),
+    );
     for method in METHODS {
         for kind in ChannelKind::ALL {
             let error = |nodes: usize| {
@@ -348,7 +342,7 @@ fn samples_between_nodes_have_the_order_of_the_stepper() {
                 let grid = system.grid;
                 let excitation = pushed(sampled(&grid, |t| (w * t).cos()));
                 let nodal = constants(nodes, &[M, C, K]);
-                let response = system.forward(&nodal, initial, Some(&excitation)).unwrap();
+                let response = system.forward(&nodal, &initial, Some(&excitation)).unwrap();
                 let mut most = 0.0f64;
                 for step in 0..nodes - 1 {
                     for fraction in [0.0, 0.1, 0.31, 0.5, 0.77, 0.99] {

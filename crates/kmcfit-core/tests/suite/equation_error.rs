@@ -9,7 +9,7 @@ use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Pa
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Measurements, equation_error};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::f64::consts::TAU;
 
@@ -21,10 +21,10 @@ const START: f64 = 2.0;
 fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
-        mass: vec![1.0; NODES],
+        inertias: vec![vec![1.0; NODES]],
         coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
     };
-    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, &common::initial(), None).unwrap();
     let damping = match damping {
         Some(value) => CoefficientFunction::fixed(CoefficientKind::Damping, vec![value; NODES]),
         None => CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
@@ -126,14 +126,14 @@ fn irregular_velocities_are_integrated() {
     let late = |i: usize| 0.4 * (1.0 + (1.7 * i as f64).sin() * (0.3 * i as f64).cos());
     let times: Vec<f64> = (0..100).map(|i| 0.25 * (i as f64 + late(i))).collect();
     let truth = NodalCoefficients {
-        mass: vec![1.0; NODES],
+        inertias: vec![vec![1.0; NODES]],
         coefficients: vec![vec![0.1; NODES], vec![1.5; NODES]],
     };
     let maker = Truth {
         system: &problem.system,
         nodal: &truth,
         excitation: None,
-        initial: common::INITIAL,
+        initial: common::initial(),
     };
     let kind = ChannelKind::Velocity;
     let values = maker.seen(kind, &times, &[]);
@@ -169,12 +169,12 @@ fn cosines() -> Problem {
         // Samples without noise are not smoothed.
         let weighting = Weighting::Sigma(1e-9);
         let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
-        Experiment::free("cosine", State::default(), nodes).with_channel(channel)
+        Experiment::free("cosine", State::rest(1), nodes).with_channel(channel)
     };
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     Problem::new(system, functions, COSINES.map(record).to_vec()).unwrap()
 }

@@ -10,7 +10,7 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 const NODES: usize = 401;
@@ -20,26 +20,19 @@ const QUANTITIES: [CoefficientKind; 3] = [
     CoefficientKind::Damping,
     CoefficientKind::Stiffness,
 ];
-const STATES: [State; 3] = [
-    State {
-        displacement: 3.3,
-        velocity: 1.0,
-    },
-    State {
-        displacement: -0.5,
-        velocity: 3.0,
-    },
-    State {
-        displacement: 2.0,
-        velocity: -2.5,
-    },
-];
+fn states() -> [State; 3] {
+    [
+        State::one(3.3, 1.0),
+        State::one(-0.5, 3.0),
+        State::one(2.0, -2.5),
+    ]
+}
 
 fn system(nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
@@ -48,7 +41,7 @@ fn truth(grid: &Grid) -> NodalCoefficients {
     let times = grid.times();
     let each = |f: &dyn Fn(f64) -> f64| times.iter().map(|t| f(*t)).collect();
     NodalCoefficients {
-        mass: each(&|t| 1.0 - 0.2 * (0.25 * t).sin()),
+        inertias: vec![each(&|t| 1.0 - 0.2 * (0.25 * t).sin())],
         coefficients: vec![
             each(&|t| 0.08 + 0.03 * (0.3 * t).cos()),
             each(&|t| 1.0 + 0.25 * (0.2 * t).sin()),
@@ -74,19 +67,20 @@ fn problem(nodes: usize, nodal: &NodalCoefficients, records: Records) -> Problem
     let list = QUANTITIES.into_iter().zip([2.0, 1.0, 1.0]);
     let list = list.map(|(q, start)| CoefficientFunction::nodal(q, vec![start; nodes]));
     let functions = Parameterization::new(list.collect(), nodes, grid.step()).unwrap();
-    let records = records.iter().map(|&(initial, forced)| {
+    let records = records.iter().map(|(initial, forced)| {
         let excitation = forced.then(|| force(&grid));
         let truth = Truth {
             system: &system,
             nodal,
             excitation: excitation.as_ref(),
-            initial,
+            initial: initial.clone(),
         };
         let kind = ChannelKind::Displacement;
         let values = truth.seen(kind, &grid.times(), &[]);
         let weighting = Weighting::Sigma(1e-3);
         let channel = Channel::new(kind, grid.times(), values, weighting, &grid, nodes).unwrap();
-        let mut experiment = Experiment::free("record", initial, nodes).with_channel(channel);
+        let mut experiment =
+            Experiment::free("record", initial.clone(), nodes).with_channel(channel);
         experiment.excitation = excitation;
         experiment
     });
@@ -146,7 +140,8 @@ fn another_system(records: Records, scale_fixed: bool, truth: &NodalCoefficients
 #[test]
 fn two_free_records_determine_the_ratios() {
     let truth = truth(&system(NODES).grid);
-    let two = [(STATES[0], false), (STATES[1], false)];
+    let [one, other, _] = states();
+    let two = [(one, false), (other, false)];
     let found = run(&smooth(problem(NODES, &truth, &two), true));
     let errors = ratio_errors(&found, &truth);
     println!(
@@ -169,7 +164,8 @@ fn two_free_records_determine_the_ratios() {
 #[test]
 fn two_free_records_and_a_forced_one_determine_the_system() {
     let truth = truth(&system(NODES).grid);
-    let three = [(STATES[0], false), (STATES[1], false), (STATES[2], true)];
+    let [one, other, forced] = states();
+    let three = [(one, false), (other, false), (forced, true)];
     let found = run(&smooth(problem(NODES, &truth, &three), false));
     let errors = common::errors(&found.best.evaluation.nodal, &truth);
     println!("two free, one forced: {errors:?}");

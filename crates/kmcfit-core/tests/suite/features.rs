@@ -11,7 +11,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::signal::{SecondOrder, band_pass};
 use kmcfit_core::internals::solvers::fit;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
 };
@@ -25,16 +25,15 @@ const DURATION: f64 = 15.0;
 /// 1; the tolerance of 1e-8 allows for poorly determined ones.
 const EXACT: f64 = 1e-8;
 const WIDTH: f64 = 0.3;
-const INITIAL: State = State {
-    displacement: 1.2,
-    velocity: -0.5,
-};
+fn initial() -> State {
+    State::one(1.2, -0.5)
+}
 
 fn system(terms: &[Law]) -> System {
     System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
-        terms: terms.to_vec(),
+        structure: Structure::one(terms.to_vec()),
     }
 }
 
@@ -208,7 +207,7 @@ struct Record {
 impl Record {
     fn free(samples: Vec<ChannelSpec>) -> Self {
         Self {
-            initial: INITIAL,
+            initial: initial(),
             initial_parameters: [None; 2],
             excitation: None,
             samples,
@@ -276,7 +275,7 @@ impl Case {
     }
 
     fn nodal(&self, which: usize) -> NodalCoefficients {
-        let mass = self
+        let mass: Vec<f64> = self
             .mass
             .as_ref()
             .map_or_else(known_mass, EstimatedFunction::values);
@@ -286,7 +285,7 @@ impl Case {
             .map(EstimatedFunction::values)
             .collect();
         let mut nodal = NodalCoefficients {
-            mass,
+            inertias: vec![mass],
             coefficients: std::mem::take(&mut coefficients),
         };
         if which > 0 {
@@ -326,18 +325,18 @@ impl Case {
                 system: &system,
                 nodal: &nodal,
                 excitation: record.excitation.as_ref(),
-                initial: record.initial,
+                initial: record.initial.clone(),
             };
             let start = |q: usize, known: f64| match record.initial_parameters[q] {
                 Some(index) => self.scalars[index].1.start,
                 None => known,
             };
-            let initial = State {
-                displacement: start(0, record.initial.displacement),
-                velocity: start(1, record.initial.velocity),
-            };
+            let initial = State::one(
+                start(0, record.initial.displacement(0)),
+                start(1, record.initial.velocity(0)),
+            );
             let mut experiment = Experiment::free("record", initial, nodes);
-            experiment.initial_parameters = record.initial_parameters;
+            experiment.initial_parameters = record.initial_parameters.to_vec();
             experiment.coefficient_set = record.coefficient_set;
             experiment.excitation = record.excitation.clone();
             for sample in &record.samples {
@@ -463,8 +462,8 @@ fn initial_states_with_and_without_a_prior() {
             let mut record = Record::free(vec![ChannelSpec::of(kind, scattered(150, 5))]);
             record.initial_parameters = [Some(0), Some(1)];
             let scalars = vec![
-                scalar(INITIAL.displacement, 0.8, prior),
-                scalar(INITIAL.velocity, 0.1, prior),
+                scalar(initial().displacement(0), 0.8, prior),
+                scalar(initial().velocity(0), 0.1, prior),
             ];
             Case::linear(vec![record])
                 .with_scalars(scalars)
@@ -518,10 +517,7 @@ fn all_together() {
     first.initial_parameters = [Some(0), Some(1)];
     let mut second = Record::free(vec![acceleration, velocity]);
     second.coefficient_set = 1;
-    second.initial = State {
-        displacement: -1.5,
-        velocity: 1.0,
-    };
+    second.initial = State::one(-1.5, 1.0);
     let short = (0..180).map(|i| grid().time(i)).collect();
     let third = Record::driven(
         forced(),
@@ -555,8 +551,8 @@ fn all_together() {
         ],
         own: vec![(2, constant(CoefficientKind::Stiffness, 5.0, 4.2))],
         scalars: vec![
-            scalar(INITIAL.displacement, 1.0, Some(0.1)),
-            scalar(INITIAL.velocity, -0.2, None),
+            scalar(initial().displacement(0), 1.0, Some(0.1)),
+            scalar(initial().velocity(0), -0.2, None),
             scalar(0.8, 1.0, None),
             scalar(0.2, 0.0, None),
             scalar(0.03, 0.0, None),
@@ -595,8 +591,8 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
         ],
         own: vec![(2, nodal(CoefficientKind::Stiffness, 5.0, -0.03, 4.5))],
         scalars: vec![
-            scalar(INITIAL.displacement, 1.0, None),
-            scalar(INITIAL.velocity, -0.2, None),
+            scalar(initial().displacement(0), 1.0, None),
+            scalar(initial().velocity(0), -0.2, None),
             scalar(1.2, 1.0, None),
             scalar(0.3, 0.0, None),
             scalar(0.01, 0.0, None),

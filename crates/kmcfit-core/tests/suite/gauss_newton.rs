@@ -39,10 +39,10 @@ const PLAIN: Units = Units {
 fn problem(units: Units) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let nodal = NodalCoefficients {
-        mass: vec![1.0; NODES],
+        inertias: vec![vec![1.0; NODES]],
         coefficients: vec![vec![0.1; NODES], vec![1.0; NODES]],
     };
-    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, &common::initial(), None).unwrap();
     let times = system.grid.times();
     let drifted = response.displacement(0).iter().zip(&times);
     let drifted: Vec<f64> = drifted.map(|(y, t)| y + 1.0 + 0.05 * t).collect();
@@ -51,7 +51,7 @@ fn problem(units: Units) -> Problem {
         .map(|y| units.length * y)
         .collect();
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.inertias[0].clone()),
         CoefficientFunction::fixed(CoefficientKind::Damping, nodal.coefficients[0].clone()),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, nodal.coefficients[1].clone()),
     ];

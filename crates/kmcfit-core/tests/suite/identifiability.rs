@@ -15,7 +15,7 @@ use kmcfit_core::internals::identifiability::{
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
 
@@ -24,20 +24,19 @@ const QUANTITIES: [CoefficientKind; 3] = [
     CoefficientKind::Damping,
     CoefficientKind::Stiffness,
 ];
-const STATES: [State; 3] = [state(3.3, 1.0), state(-0.5, 3.0), state(2.0, -2.5)];
-
-const fn state(displacement: f64, velocity: f64) -> State {
-    State {
-        displacement,
-        velocity,
-    }
+fn states() -> [State; 3] {
+    [
+        State::one(3.3, 1.0),
+        State::one(-0.5, 3.0),
+        State::one(2.0, -2.5),
+    ]
 }
 
 /// A record: its initial state, and the force at the nodes.
 type Record = (State, Option<Vec<f64>>);
 
 fn free(i: usize) -> Record {
-    (STATES[i], None)
+    (states()[i].clone(), None)
 }
 
 /// Forced at every node after the first `silent`.
@@ -46,7 +45,7 @@ fn forced(i: usize, grid: &Grid, silent: usize) -> Record {
         .map(|t| 1.5 + (0.9 * t).sin())
         .collect();
     force[..silent].fill(0.0);
-    (STATES[i], Some(force))
+    (states()[i].clone(), Some(force))
 }
 
 /// Displacement of `system` at all nodes, for each record; sigma 1e-3.
@@ -61,13 +60,11 @@ fn with_records(
     let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
     let records = records.iter().map(|(initial, force)| {
         let excitation = force.as_ref().map(|f| Excitation::force_at_nodes(f));
-        let response = system
-            .forward(nodal, *initial, excitation.as_ref())
-            .unwrap();
+        let response = system.forward(nodal, initial, excitation.as_ref()).unwrap();
         let weighting = Weighting::Sigma(1e-3);
         let channel =
             Channel::displacement_at_nodes(response.displacement(0).to_vec(), 1, weighting, &grid);
-        let mut record = Experiment::free("record", *initial, nodes).with_channel(channel);
+        let mut record = Experiment::free("record", initial.clone(), nodes).with_channel(channel);
         record.excitation = excitation;
         record
     });
@@ -94,7 +91,7 @@ fn linear_mass(system: &System, record: Record) -> Problem {
     let degree_1 = Basis::Polynomial { degree: 1 };
     let nodal = NodalCoefficients {
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
-        mass: mass.clone(),
+        inertias: vec![mass.clone()],
     };
     let start = degree_1.project(&grid, &mass).unwrap();
     let list = vec![
@@ -202,18 +199,18 @@ proptest! {
         let system = System {
             grid: Grid::new(0.0, 4.0, nodes).unwrap(),
             method: if rk4 { Method::Rk4 } else { Method::Midpoint },
-            terms: vec![Law::Damping, Law::Stiffness],
+            structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
         };
         let grid = system.grid;
         let function = |(base, swing, pace): (f64, f64, f64)| -> Vec<f64> {
             grid.times().iter().map(|t| base + swing * (pace * t).sin()).collect()
         };
         let [mass, damping, stiffness] = shape.map(function);
-        let nodal = NodalCoefficients { mass, coefficients: vec![damping, stiffness] };
+        let nodal = NodalCoefficients { inertias: vec![mass], coefficients: vec![damping, stiffness] };
         let records: Vec<Record> = states.iter().map(|&(y, v, drive)| {
             let mut force = forced(0, &grid, 0).1.unwrap();
             force[from..from + pause].fill(0.0);
-            (state(y, v), drive.then_some(force))
+            (State::one(y, v), drive.then_some(force))
         }).collect();
         let problem = nodal_problem(&system, &nodal, &records);
         let (counted, seen) = (structural_rank(&problem).rank_bound, spectrum(&problem).rank());
@@ -300,11 +297,16 @@ impl Coverage {
 /// Fits of 200 records with noise: the coverage of every function that is estimated, and of the ratios.
 fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
     let clean = (problem.system)
-        .forward(truth, problem.experiments[0].initial, None)
+        .forward(truth, &problem.experiments[0].initial, None)
         .unwrap();
-    let ratio = |p: &[f64]| -> Vec<f64> { p.iter().zip(&truth.mass).map(|(p, m)| p / m).collect() };
+    let ratio = |p: &[f64]| -> Vec<f64> {
+        p.iter()
+            .zip(&truth.inertias[0])
+            .map(|(p, m)| p / m)
+            .collect()
+    };
     let truths = [
-        truth.mass.clone(),
+        truth.inertias[0].clone(),
         truth.coefficients[0].clone(),
         ratio(&truth.coefficients[1]),
         ratio(&truth.coefficients[0]),
@@ -348,11 +350,11 @@ fn bands_of_a_linear_mass_cover_the_truth() {
     let grid = system.grid;
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let truth = NodalCoefficients {
-        mass,
+        inertias: vec![mass],
         coefficients: vec![vec![0.02; 500], vec![1.0; 500]],
     };
     let degree_1 = Basis::Polynomial { degree: 1 };
-    let start = degree_1.project(&grid, &truth.mass).unwrap();
+    let start = degree_1.project(&grid, &truth.inertias[0]).unwrap();
     let list = vec![
         CoefficientFunction::free(CoefficientKind::Mass, degree_1, &grid, start),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.02, 500),
@@ -379,7 +381,7 @@ fn bands_of_functions_on_knots_cover_the_truth() {
     ];
     let values = |b: &Basis, p: &[f64]| b.design(&grid).multiply(p, 500);
     let truth = NodalCoefficients {
-        mass: values(&mass, &starts[0]),
+        inertias: vec![values(&mass, &starts[0])],
         coefficients: vec![values(&damping, &starts[1]), vec![1.0; 500]],
     };
     let [m, c] = starts;
@@ -476,7 +478,7 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.inertias[0].clone()),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.0, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
@@ -504,7 +506,7 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     // With the damping held the stiffness is known better, and never worse.
     let (held, free) = (&bands.functions[2], &open.functions[2]);
     assert!(held.standard_error[5] <= free.standard_error[5] * (1.0 + 1e-9));
-    assert_eq!(bands.functions[0].pointwise(0), [nodal.mass[0]; 2]);
+    assert_eq!(bands.functions[0].pointwise(0), [nodal.inertias[0][0]; 2]);
     assert_eq!(
         classify_functions(&problem, &here, &bands)[0].verdict,
         Classification::Fixed

@@ -21,10 +21,10 @@ fn problem(basis: &Basis) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let grid = system.grid;
     let truth = NodalCoefficients {
-        mass: grid.times().iter().map(|t| 0.8 + 0.01 * t).collect(),
+        inertias: vec![grid.times().iter().map(|t| 0.8 + 0.01 * t).collect()],
         coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
     };
-    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, &common::initial(), None).unwrap();
     let start = basis.constant(&grid, 1.0);
     let list = vec![
         CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, start),
@@ -217,7 +217,7 @@ fn a_start_is_projected_to_a_positive_mass() {
         .unwrap();
     let start = problem.functions.start();
     let least = |theta: &[f64]| {
-        let mass = problem.functions.nodal(theta).mass;
+        let mass = problem.functions.nodal(theta).inertias.swap_remove(0);
         mass.into_iter().fold(f64::INFINITY, f64::min)
     };
     let metric = problem.functions.gram_diagonal();

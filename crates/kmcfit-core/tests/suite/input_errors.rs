@@ -43,6 +43,12 @@ fn states([m, c, k]: [f64; 3], force: &[f64]) -> Vec<[f64; 2]> {
     states.into_iter().map(|[y, v, _]| [y, v]).collect()
 }
 
+/// Accelerations under a force.
+fn accelerations([m, c, k]: [f64; 3], force: &[f64]) -> Vec<f64> {
+    let states = states([m, c, k], force).into_iter().zip(force);
+    states.map(|([y, v], f)| (f - c * v - k * y) / m).collect()
+}
+
 /// A case: share of the noise in the force, damping ratio, what the noise is, and as what the fit treats it.
 #[derive(Debug, Clone, Copy)]
 struct Case {
@@ -56,6 +62,9 @@ struct Case {
     estimates_sigma: bool,
     /// First coefficient of autoregressive noise of the channel.
     correlation: f64,
+    /// The channel: displacement or acceleration.
+    kind: ChannelKind,
+    nodes: usize,
 }
 
 impl Case {
@@ -67,6 +76,8 @@ impl Case {
         factor: 1.0,
         estimates_sigma: false,
         correlation: 0.0,
+        kind: ChannelKind::Displacement,
+        nodes: 2 * (SAMPLES - 1) + 1,
     };
 }
 
@@ -84,7 +95,10 @@ fn fitted(case: Case, seed: u64) -> (Problem, Fit) {
         InputErrorKind::Sensor => (&known, &disturbed),
         InputErrorKind::Drive => (&disturbed, &known),
     };
-    let clean = response(truth, acting);
+    let clean = match case.kind {
+        ChannelKind::Acceleration => accelerations(truth, acting),
+        _ => response(truth, acting),
+    };
     let sigma = 0.01 * rms(&clean);
     let mut noise = 0.0;
     let own = white(seed, 4).into_iter().map(|e| {
@@ -93,7 +107,7 @@ fn fitted(case: Case, seed: u64) -> (Problem, Fit) {
     });
     let samples: Vec<f64> = clean.iter().zip(own).map(|(y, e)| y + e).collect();
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
-    let mut channel = ChannelSpec::new(ChannelKind::Displacement, &times, &samples);
+    let mut channel = ChannelSpec::new(case.kind, &times, &samples);
     channel.weighting = Some(match case.estimates_sigma {
         true => Weighting::Estimated { sigma },
         false => Weighting::Sigma(sigma),
@@ -107,7 +121,7 @@ fn fitted(case: Case, seed: u64) -> (Problem, Fit) {
     }
     let problem = Builder::new(truth.map(|p| CoefficientSpec::constant(1.02 * p)))
         .record(record)
-        .nodes(2 * (SAMPLES - 1) + 1)
+        .nodes(case.nodes)
         .method(Method::Rk4)
         .build()
         .unwrap();
@@ -150,6 +164,33 @@ fn cases() -> Vec<Case> {
         }
     }
     cases
+}
+
+/// An acceleration has the error of the force at its own time, whatever the nodes: neither is the stated sigma contradicted nor are the intervals
+/// too narrow with nodes between the samples.
+#[test]
+fn errors_of_the_force_pass_into_accelerations_between_nodes() {
+    let seeds = seeds(6, 20);
+    let case = Case {
+        share: 0.05,
+        stated: Some(InputErrorKind::Sensor),
+        kind: ChannelKind::Acceleration,
+        nodes: 4 * SAMPLES / 3,
+        ..Case::PLAIN
+    };
+    for seed in 0..seeds {
+        let (problem, fit) = fitted(case, seed);
+        let warnings = Plausibility::at(&problem, &fit.best.evaluation).warnings;
+        let is_contradiction =
+            |w: &FitWarning| matches!(w, FitWarning::ContradictedInputSigma { .. });
+        assert!(
+            !warnings.iter().any(is_contradiction),
+            "{seed}: {warnings:?}"
+        );
+    }
+    let (counts, _) = summary(&errors(case, seeds));
+    let hold = counts.iter().all(|held| *held >= least_held(seeds));
+    assert!(hold, "{counts:?}");
 }
 
 #[test]

@@ -23,7 +23,7 @@ fn problem() -> (Problem, Vec<f64>) {
     let level = |t: f64| if t < JUMP { 2.0 } else { 1.6 };
     let stiffness: Vec<f64> = grid.times().iter().map(|t| level(*t)).collect();
     let truth = NodalCoefficients {
-        mass: vec![1.0; nodes],
+        inertias: vec![vec![1.0; nodes]],
         coefficients: vec![vec![0.05; nodes], stiffness],
     };
     let observed = common::noisy(&system, &truth, SIGMA, 1);

@@ -113,7 +113,7 @@ fn coefficients_are_sums() {
         let mut nodal = problem.functions.empty_nodal();
         let set = of.expect("a record").coefficient_set;
         problem.functions.nodal_into(&theta, set, &mut nodal);
-        assert!((nodal.mass[0] - mass).abs() < 1e-15, "{record}");
+        assert!((nodal.inertias[0][0] - mass).abs() < 1e-15, "{record}");
         assert!((nodal.coefficients[1][0] - 750.0).abs() < 1e-12);
     }
     // Known values cost nothing at themselves, and one at a distance of one standard deviation.
@@ -182,14 +182,11 @@ fn known_values_enter_the_covariance_as_measurements() {
 #[test]
 fn the_uncertainty_of_a_weighed_mass_is_that_of_the_stiffness() {
     let times = times(500);
-    let state = State {
-        displacement: 0.01,
-        velocity: 0.0,
-    };
+    let state = State::one(0.01, 0.0);
     let noise = white(1, 1, 500);
     let exact = times
         .iter()
-        .map(|t| constant_coefficients((4.5, 2.0, 900.0), state, *t).0);
+        .map(|t| constant_coefficients((4.5, 2.0, 900.0), state.clone(), *t).0);
     let samples: Vec<f64> = exact.zip(&noise).map(|(y, e)| y + 1e-4 * e).collect();
     let error = |mass: CoefficientSpec| {
         let system = [
@@ -224,14 +221,12 @@ fn weighed(seed: u64) -> Problem {
     const BLOCKS: [[f64; 2]; 2] = [[1.4665, 0.01], [2.931, 0.014]];
     let samples = 300;
     let times = times(samples);
-    let state = State {
-        displacement: 0.01,
-        velocity: 0.0,
-    };
+    let state = State::one(0.01, 0.0);
     let sigma = 2e-4;
     let record = |i: usize, name: &str, added: f64| {
         let [m, c, k] = CARRIAGE;
-        let exact = (times.iter()).map(|t| constant_coefficients((m + added, c, k), state, *t).0);
+        let exact =
+            (times.iter()).map(|t| constant_coefficients((m + added, c, k), state.clone(), *t).0);
         let noise = white(seed, i as u64, samples);
         let samples: Vec<f64> = exact.zip(noise).map(|(y, e)| y + sigma * e).collect();
         Record::new(name)

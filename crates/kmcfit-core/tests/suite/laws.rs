@@ -4,7 +4,7 @@ use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::Fit;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -60,16 +60,13 @@ impl Case {
     fn nodal(&self, grid: &Grid) -> NodalCoefficients {
         let values = |f: usize| grid.times().iter().map(|t| self.value(f, *t)).collect();
         NodalCoefficients {
-            mass: values(0),
+            inertias: vec![values(0)],
             coefficients: vec![values(1), values(2)],
         }
     }
 
     fn state(&self) -> State {
-        State {
-            displacement: self.start[0],
-            velocity: self.start[1],
-        }
+        State::one(self.start[0], self.start[1])
     }
 
     fn force(&self, t: f64) -> f64 {
@@ -86,7 +83,7 @@ fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, DURATION, nodes).unwrap(),
         method,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
@@ -108,10 +105,10 @@ fn responses_of_a_linear_system_superpose() {
         let system = system(501, Method::Rk4);
         let nodal = case.nodal(&system.grid);
         let excitation = case.excitation(&system.grid);
-        let rest = State::default();
-        let both = system.forward(&nodal, case.state(), Some(&excitation));
-        let free = system.forward(&nodal, case.state(), None).unwrap();
-        let forced = system.forward(&nodal, rest, Some(&excitation)).unwrap();
+        let rest = State::rest(1);
+        let both = system.forward(&nodal, &case.state(), Some(&excitation));
+        let free = system.forward(&nodal, &case.state(), None).unwrap();
+        let forced = system.forward(&nodal, &rest, Some(&excitation)).unwrap();
         let sum: Vec<f64> = (free.displacement(0).iter().zip(forced.displacement(0)))
             .map(|(a, b)| a + b)
             .collect();
@@ -131,7 +128,7 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
             let system = system(nodes, Method::Rk4);
             let grid = system.grid;
             let excitation = case.excitation(&grid);
-            let response = system.forward(&case.nodal(&grid), case.state(), Some(&excitation));
+            let response = system.forward(&case.nodal(&grid), &case.state(), Some(&excitation));
             let response = response.unwrap();
             let (y, v) = (response.displacement(0), response.velocity(0));
             let energy = |i: usize| {
@@ -165,7 +162,7 @@ fn record(case: Case, per_metre: f64, later: f64) -> Record {
     let system = system(121, Method::Rk4);
     let grid = system.grid;
     let response = system
-        .forward(&case.nodal(&grid), case.state(), None)
+        .forward(&case.nodal(&grid), &case.state(), None)
         .unwrap();
     // A deterministic error makes every fit inexact.
     let read = |(i, y): (usize, &f64)| per_metre * (y + 0.01 * (1.3 * i as f64).sin());
@@ -253,10 +250,7 @@ fn the_order_of_records_and_records_without_samples_do_not_matter() {
         let fit = fitted(&both);
         same(&fit, &fitted(&problem([other, case])), case);
         let mut more = both.clone();
-        let state = State {
-            displacement: 0.3,
-            velocity: 0.0,
-        };
+        let state = State::one(0.3, 0.0);
         let unused = Experiment::free("unused", state, both.system.grid.nodes());
         more = more
             .with(|parts| {

@@ -9,7 +9,7 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{Fit, fit_with_noise};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
 use std::f64::consts::{PI, TAU};
 
@@ -19,16 +19,15 @@ const DURATION: f64 = 200.0;
 const NODES: usize = 6_401;
 const NOISE: f64 = 0.01;
 const DAMPING: f64 = 0.01;
-const INITIAL: State = State {
-    displacement: 1.0,
-    velocity: 2.0,
-};
+fn initial() -> State {
+    State::one(1.0, 2.0)
+}
 
 fn system() -> System {
     System {
         grid: Grid::new(0.0, DURATION, NODES).unwrap(),
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
@@ -52,7 +51,7 @@ fn truth(grid: &Grid, basis: &Basis) -> NodalCoefficients {
         .collect();
     let theta = basis.project(grid, &stiffness).unwrap();
     NodalCoefficients {
-        mass: vec![1.0; NODES],
+        inertias: vec![vec![1.0; NODES]],
         coefficients: vec![
             vec![DAMPING; NODES],
             basis.design(grid).multiply(&theta, NODES),
@@ -74,14 +73,14 @@ fn problem(
         system: &system,
         nodal: &truth,
         excitation: None,
-        initial: INITIAL,
+        initial: initial(),
     };
     let times: Vec<f64> = grid.times()[..NODES - 1].to_vec();
     let clean = maker.seen(kind, &times, &[]);
     let sigma = NOISE * rms(&clean);
     let values = with_noise(&clean, sigma, seed);
     let channel = Channel::new(kind, times, values, Weighting::Sigma(sigma), &grid, NODES);
-    let mut experiment = Experiment::free("free", INITIAL, NODES).with_channel(channel.unwrap());
+    let mut experiment = Experiment::free("free", initial(), NODES).with_channel(channel.unwrap());
     let middle = truth.coefficients[1][NODES / 2];
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
@@ -103,11 +102,8 @@ fn problem(
             prior: None,
         };
         functions = functions.with_scalars(vec![scalar("y(0)", 1.0), scalar("v(0)", 2.0)]);
-        experiment.initial_parameters = [Some(0), Some(1)];
-        experiment.initial = State {
-            displacement: 0.0,
-            velocity: 0.0,
-        };
+        experiment.initial_parameters = vec![Some(0), Some(1)];
+        experiment.initial = State::one(0.0, 0.0);
     }
     (
         Problem::new(system, functions, vec![experiment]).unwrap(),

@@ -7,14 +7,13 @@ use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Pa
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::step::Trajectory;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 const NOISE: f64 = 0.01;
-const REST: State = State {
-    displacement: 0.0,
-    velocity: 0.0,
-};
+fn rest() -> State {
+    State::one(0.0, 0.0)
+}
 
 /// A constant: its kind, true value and start value.
 type Constant = (CoefficientKind, f64, f64);
@@ -30,14 +29,14 @@ impl Case {
         let nodes = self.system.grid.nodes();
         let values = |c: &Constant| vec![c.1; nodes];
         NodalCoefficients {
-            mass: values(&self.constants[0]),
+            inertias: vec![values(&self.constants[0])],
             coefficients: self.constants[1..].iter().map(values).collect(),
         }
     }
 
     fn response(&self) -> Trajectory {
         let (nodal, excitation) = (self.nodal(), Some(&self.excitation));
-        self.system.forward(&nodal, REST, excitation).unwrap()
+        self.system.forward(&nodal, &rest(), excitation).unwrap()
     }
 
     fn problem(&self, seed: u64) -> Problem {
@@ -47,7 +46,7 @@ impl Case {
             system: &self.system,
             nodal: &nodal,
             excitation: Some(&self.excitation),
-            initial: REST,
+            initial: rest(),
         };
         let kind = ChannelKind::Displacement;
         let clean = truth.seen(kind, &grid.times(), &[]);
@@ -58,7 +57,7 @@ impl Case {
         let list = self.constants.iter();
         let list = list.map(|(q, _, start)| CoefficientFunction::constant(*q, *start, nodes));
         let functions = Parameterization::new(list.collect(), nodes, grid.step()).unwrap();
-        let experiment = Experiment::free("driven", REST, nodes)
+        let experiment = Experiment::free("driven", rest(), nodes)
             .with_excitation(self.excitation.clone())
             .with_channel(channel);
         Problem::new(self.system.clone(), functions, vec![experiment]).unwrap()
@@ -98,7 +97,7 @@ fn system(nodes: usize, duration: f64, terms: &[Law]) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
-        terms: terms.to_vec(),
+        structure: Structure::one(terms.to_vec()),
     }
 }
 

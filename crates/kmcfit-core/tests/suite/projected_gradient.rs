@@ -20,10 +20,10 @@ fn problem(sigma: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let values = [1.0, 0.1, 1.0].map(|value| vec![value; NODES]);
     let nodal = NodalCoefficients {
-        mass: values[0].clone(),
+        inertias: vec![values[0].clone()],
         coefficients: values[1..].to_vec(),
     };
-    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, &common::initial(), None).unwrap();
     let observed = with_noise(response.displacement(0), 1.0, 7);
     let quantities = [
         CoefficientKind::Mass,

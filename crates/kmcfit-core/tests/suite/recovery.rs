@@ -57,7 +57,7 @@ fn linear_mass(system: System, observed: Vec<f64>, sigma: Option<f64>) -> Proble
 fn paper_data(nodes: usize) -> (System, NodalCoefficients, Vec<f64>) {
     let system = common::system(nodes, Method::Midpoint);
     let truth = common::paper_system(nodes);
-    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, &common::initial(), None).unwrap();
     (system, truth, response.displacement(0).to_vec())
 }
 
@@ -151,7 +151,7 @@ fn bessel_fit(nodes: usize, method: Method) -> f64 {
         .collect();
     let problem = linear_mass(system, observed, None);
     let found = run(&problem, Initial::Data);
-    let mass = &found.best.evaluation.nodal.mass;
+    let mass = &found.best.evaluation.nodal.inertias[0];
     let errors = mass
         .iter()
         .zip(&times)
@@ -186,10 +186,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
             unit[j] = 1.0;
             let direction = kmcfit_core::internals::system::SystemTangent {
                 nodal: problem.functions.direction(&unit, 0),
-                initial: kmcfit_core::internals::system::State {
-                    displacement: 0.0,
-                    velocity: 0.0,
-                },
+                initial: kmcfit_core::internals::system::State::one(0.0, 0.0),
             };
             let response = &here.trajectories[0];
             let driven = Driven {
@@ -281,7 +278,7 @@ fn positivity_alone_does_not_recover_the_system() {
     let found = fit(&problem, &start, &how, &mut |_| {}).unwrap();
     let nodal = &found.best.evaluation.nodal;
     let least = |f: &[f64]| f.iter().copied().fold(f64::INFINITY, f64::min);
-    assert!(least(&nodal.mass) >= 0.05 && least(&nodal.coefficients[0]) >= -1e-9);
+    assert!(least(&nodal.inertias[0]) >= 0.05 && least(&nodal.coefficients[0]) >= -1e-9);
     let start_cost = problem.evaluate(&start).unwrap().cost;
     assert!(
         found.best.evaluation.misfit <= 1e-6 * start_cost,

@@ -9,7 +9,7 @@ use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
 use kmcfit_core::internals::solvers::{
     FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
 };
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 /// Nodes from one sample to the next.
@@ -25,13 +25,13 @@ fn problem() -> Problem {
     let system = System {
         grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     let truth = NodalCoefficients {
-        mass: vec![1.0; nodes],
+        inertias: vec![vec![1.0; nodes]],
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
-    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, &common::initial(), None).unwrap();
     let observed: Vec<f64> = response
         .displacement(0)
         .iter()
@@ -47,7 +47,7 @@ fn problem() -> Problem {
         CoefficientFunction::constant(CoefficientKind::Stiffness, 130.0, nodes),
     ];
     let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &system.grid);
-    let experiment = Experiment::free("free decay", common::INITIAL, nodes).with_channel(channel);
+    let experiment = Experiment::free("free decay", common::initial(), nodes).with_channel(channel);
     let functions = Parameterization::new(list, nodes, step).unwrap();
     Problem::new(system, functions, vec![experiment]).unwrap()
 }
@@ -131,11 +131,11 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let system = System {
         grid: Grid::new(0.0, 40.0, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness, Law::CubicStiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness, Law::CubicStiffness]),
     };
     let truth = [1.0, 1.2, 20.0, 15.0];
     let nodal = NodalCoefficients {
-        mass: vec![truth[0]; nodes],
+        inertias: vec![vec![truth[0]; nodes]],
         coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
     };
     let drive = |(i, t): (usize, f64)| match i < first {
@@ -146,11 +146,8 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         .map(drive)
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
-    let rest = State {
-        displacement: 0.0,
-        velocity: 0.0,
-    };
-    let response = system.forward(&nodal, rest, Some(&excitation)).unwrap();
+    let rest = State::one(0.0, 0.0);
+    let response = system.forward(&nodal, &rest, Some(&excitation)).unwrap();
     let observed = response
         .displacement(0)
         .iter()
@@ -233,7 +230,7 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
     let system = System {
         grid: Grid::new(0.0, 20.0, nodes).unwrap(),
         method: Method::Midpoint,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     // A response that no oscillator has.
     let observed = (0..nodes).map(|i| ((i * i) as f64).sin()).collect();
@@ -247,7 +244,7 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
         CoefficientFunction::constant(CoefficientKind::Stiffness, 2.0, nodes),
     ];
     let functions = Parameterization::new(list, nodes, system.grid.step()).unwrap();
-    let experiment = Experiment::free("rubbish", common::INITIAL, nodes).with_channel(channel);
+    let experiment = Experiment::free("rubbish", common::initial(), nodes).with_channel(channel);
     let problem = Problem::new(system, functions, vec![experiment]).unwrap();
     assert!(problem.supports_continuous() && !problem.truncated(0.5).supports_continuous());
     let settings = FitSettings {

@@ -10,7 +10,7 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
 use kmcfit_core::internals::solvers::fit_with_noise;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,10 +21,9 @@ const DURATION: f64 = 12.0;
 /// Noise relative to the samples: small enough that the problem is linear over the errors of the parameters (per mille to per cent),
 /// whose second-order bias is a hundredth of their standard deviation.
 const NOISE: f64 = 0.02;
-const INITIAL: State = State {
-    displacement: 1.5,
-    velocity: -0.8,
-};
+fn initial() -> State {
+    State::one(1.5, -0.8)
+}
 
 /// Samples from clean ones, sigma and a seed.
 type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
@@ -77,7 +76,7 @@ impl Setup {
         System {
             grid: Grid::new(0.0, DURATION, NODES).unwrap(),
             method: Method::Rk4,
-            terms: self.terms.iter().map(|t| t.0).collect(),
+            structure: Structure::one(self.terms.iter().map(|t| t.0).collect()),
         }
     }
 
@@ -88,7 +87,7 @@ impl Setup {
             .filter_map(|(p, start)| start.map(|_| *p))
             .collect();
         if self.state {
-            theta.extend([INITIAL.displacement, INITIAL.velocity]);
+            theta.extend([initial().displacement(0), initial().velocity(0)]);
         }
         theta.extend(self.sensor.iter().flatten());
         theta
@@ -98,14 +97,14 @@ impl Setup {
         let system = self.system();
         let each: Vec<Vec<f64>> = self.truth.iter().map(|p| vec![*p; NODES]).collect();
         let nodal = NodalCoefficients {
-            mass: each[0].clone(),
+            inertias: vec![each[0].clone()],
             coefficients: each[1..].to_vec(),
         };
         let truth = Truth {
             system: &system,
             nodal: &nodal,
             excitation: self.excitation.as_ref(),
-            initial: INITIAL,
+            initial: initial(),
         };
         let seen = truth.seen(self.kind, &system.grid.times(), &[]);
         let [gain, offset] = self.sensor.unwrap_or([1.0, 0.0]);
@@ -135,10 +134,10 @@ impl Setup {
         let weighting = Weighting::Sigma(sigma);
         let mut channel =
             Channel::new(self.kind, grid.times(), values, weighting, &grid, NODES).unwrap();
-        let mut experiment = Experiment::free("record", INITIAL, NODES);
+        let mut experiment = Experiment::free("record", initial(), NODES);
         experiment.excitation = self.excitation.clone();
         if self.state {
-            experiment.initial_parameters = [Some(0), Some(1)];
+            experiment.initial_parameters = vec![Some(0), Some(1)];
             scalars.extend([scalar(1.3), scalar(-0.6)]);
         }
         if self.sensor.is_some() {
@@ -486,10 +485,7 @@ fn zero_samples_keep_their_sigma() {
     let mut problem = with_an_offset(vec![0.0; NODES], &setup);
     problem = problem
         .with(|parts| {
-            parts.experiments[0].initial = State {
-                displacement: 0.0,
-                velocity: 0.0,
-            };
+            parts.experiments[0].initial = State::one(0.0, 0.0);
         })
         .unwrap();
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});

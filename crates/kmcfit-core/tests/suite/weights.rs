@@ -55,7 +55,7 @@ fn relative_errors(problem: &Problem, theta: &[f64], truth: &NodalCoefficients) 
     };
     let (found, exact) = (Ratios::of(&nodal), Ratios::of(truth));
     [
-        relative(&nodal.mass, &truth.mass),
+        relative(&nodal.inertias[0], &truth.inertias[0]),
         relative(&found.k_over_m, &exact.k_over_m),
     ]
 }

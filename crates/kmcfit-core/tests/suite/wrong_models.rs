@@ -278,7 +278,9 @@ impl Case {
                     }
                     RecordError::InputSign { .. } => (1.0, 0.0, -1.0),
                     // A spike of the force: no remedy of the response.
-                    RecordError::InputPulses { .. } => (1.0, 0.0, 1.0),
+                    RecordError::InputPulses { .. } | RecordError::InputJump { .. } => {
+                        (1.0, 0.0, 1.0)
+                    }
                     RecordError::ChannelFactor {
                         channel, factor, ..
                     } => (1.0, 0.0, if channel == kind.name() { *factor } else { 1.0 }),

@@ -11,10 +11,13 @@ use crate::config::values::KnownValue;
 use crate::config::values::NumberOrEstimate;
 use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
+use crate::number_format::significant;
+use crate::tables::codes_of_column;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{
-    Interpolation, Signal, Spectrum, driven_oscillator, median, onset, two_forced_modes, two_modes,
+    Interpolation, Signal, Spectrum, driven_oscillator, is_kept_up, median, onset,
+    two_forced_modes, two_modes,
 };
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::both;
@@ -65,12 +68,16 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
         warnings
     };
     let of_motion = || {
-        let outliers = record.channels.iter().filter_map(|c| outliers(spec, c));
-        let mut warnings: Vec<DataWarning> = outliers.collect();
+        let mut warnings: Vec<DataWarning> = missing_codes(record).into_iter().collect();
+        if warnings.is_empty() {
+            let outliers = record.channels.iter().filter_map(|c| outliers(spec, c));
+            warnings.extend(outliers);
+        }
         // The equation error simulates no response from an initial state.
         if !is_equation_error(file) {
             warnings.extend(rest_before_motion(spec, record));
         }
+        warnings.extend(unmeasured_force(spec, record));
         warnings.extend(modes(spec, record));
         warnings.extend(excluded_frequency(file, record));
         warnings
@@ -315,6 +322,36 @@ fn correlation_with_estimate(
     let correlation = product(&estimated, &measured)
         / (product(&estimated, &estimated) * product(&measured, &measured)).sqrt();
     correlation.is_finite().then_some(correlation)
+}
+
+/// A record without an input that a random force keeps up.
+fn unmeasured_force(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
+    let mut channels = record.channels.iter();
+    let is_affected = |c: &&RawChannel| c.spacing.is_some_and(|s| is_kept_up(&c.values, s));
+    let found = channels.find(|c| !has_input(spec, record) && is_affected(c))?;
+    Some(DataWarning::UnmeasuredForce {
+        channel: found.kind.name(),
+    })
+}
+
+/// Codes for missing samples, which no statement of the model takes as such.
+fn missing_codes(record: &RawRecord) -> Option<DataWarning> {
+    let (mut channels, mut codes): (Vec<String>, Vec<f64>) = Default::default();
+    for channel in record.channels.iter().filter(|c| c.is_squared()) {
+        // Digits of the file, without the rounding of the conversion to SI.
+        let in_file = |x: &f64| significant(x / channel.unit.factor(), 12).parse();
+        let values: Vec<f64> = (channel.values.iter())
+            .filter_map(|x| in_file(x).ok())
+            .collect();
+        let found = codes_of_column(&values, false);
+        if !found.is_empty() {
+            channels.push(channel.kind.name().to_owned());
+        }
+        codes.extend(found.iter().map(|(code, _)| *code));
+    }
+    codes.sort_by(f64::total_cmp);
+    codes.dedup();
+    (!codes.is_empty()).then_some(DataWarning::MissingCodes { channels, codes })
 }
 
 /// A free record, or one with a measured force, in which two modes vibrate.

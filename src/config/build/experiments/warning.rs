@@ -133,6 +133,12 @@ pub(crate) enum DataWarning {
          {start}}}`"
     )]
     AtRest { channel: &'static str, start: f64 },
+    /// A response that a random force keeps up, without a measured input.
+    #[error(
+        "no force is measured, and the {channel} does not decay: an unmeasured force acts, with which neither a free response nor the \
+         equation error determines the damping; `fit: {{method: equation-error}}` gives the natural frequency"
+    )]
+    UnmeasuredForce { channel: &'static str },
     /// Two modes in a free response.
     #[error(
         "two modes vibrate in the {channel}, at {} and {} Hz; the model has one; keep one by `band`, or measure at a node of the \
@@ -156,6 +162,18 @@ pub(crate) enum DataWarning {
         frequency: f64,
         min: Option<f64>,
         max: Option<f64>,
+    },
+    /// Values that stand for missing samples.
+    #[error(
+        "the {} holds the value {} far outside the others, which stands for a missing sample: `missing: {}`",
+        channels.join(" and the "),
+        codes.iter().map(|code| format!("{code:?}")).collect::<Vec<_>>().join(" and "),
+        serde_json::json!(codes)
+    )]
+    MissingCodes {
+        /// Names of the columns by their quantity.
+        channels: Vec<String>,
+        codes: Vec<f64>,
     },
     /// Outliers under a quadratic loss.
     #[error(
@@ -263,12 +281,15 @@ fn range_in_words(min: Option<f64>, max: Option<f64>) -> String {
 impl DataWarning {
     /// Kind of [`DataWarning::UnitAssumed`].
     pub const UNIT_ASSUMED: &str = "unit_assumed";
-    /// Kinds of the warnings that show a wrong unit.
-    pub const DOUBTFUL_UNITS: [&str; 8] = [
+    /// Kinds of the warnings on what a file states of units and scales.
+    pub const STATED_UNITS: [&str; 4] = [
         "scale_not_applied",
         "unknown_unit",
         "unit_of_name_unused",
         "volts",
+    ];
+    /// Kinds of the warnings that show a wrong unit by the samples.
+    pub const DOUBTFUL_UNITS: [&str; 4] = [
         "implausible_magnitudes",
         "mains_hum",
         "suspicious_factor",

@@ -23,7 +23,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
         for channel in &experiment.channels {
             if !superposes(problem, experiment, channel) {
                 // A sample of the known initial state does not depend on the parameters.
-                let known = experiment.initial_parameters == [None; 2]
+                let known = experiment.begins_known()
                     && !channel.sensor().is_estimated()
                     && channel.filter().is_empty();
                 let acts = |p: &TimePoint| last_acting(problem, channel.kind(), *p).is_some();
@@ -83,8 +83,8 @@ fn superposes(
     experiment: &Experiment,
     channel: &crate::record::Channel,
 ) -> bool {
-    problem.system.terms.iter().all(|t| t.is_linear())
-        && experiment.initial_parameters == [None; 2]
+    problem.system.laws().iter().all(|t| t.is_linear())
+        && experiment.begins_known()
         && !channel.sensor().is_estimated()
         && channel.filter().is_empty()
 }
@@ -111,8 +111,8 @@ impl Inputs {
     fn of(problem: &Problem, members: &[usize]) -> Self {
         let records: Vec<&Experiment> = members.iter().map(|e| &problem.experiments[*e]).collect();
         let mut span = Span::default();
-        span.add(records.iter().map(|r| r.initial.displacement).collect());
-        span.add(records.iter().map(|r| r.initial.velocity).collect());
+        span.add(records.iter().map(|r| r.initial.displacement(0)).collect());
+        span.add(records.iter().map(|r| r.initial.velocity(0)).collect());
         let initially = span.len();
         let steps = problem.system.grid.nodes() - 1;
         let base = |r: &Experiment, i: usize, s: usize| {

@@ -244,7 +244,7 @@ mod tests {
     use crate::objective::GradientKind;
     use crate::record::ChannelKind;
     use crate::record::Weighting;
-    use crate::structure::Law;
+    use crate::structure::{Law, Structure};
     use crate::system::Method;
     use crate::system::{Excitation, Grid, State, System};
 
@@ -285,7 +285,7 @@ mod tests {
             let thirds = (0..nodes).step_by(3).collect();
             Experiment {
                 coefficient_set,
-                ..Experiment::free("driven", State::default(), nodes)
+                ..Experiment::free("driven", State::rest(1), nodes)
                     .with_excitation(Excitation::force_at_nodes(&force))
                     .with_channel(channel(ChannelKind::Acceleration, accelerations))
                     .with_channel(channel(ChannelKind::Displacement, thirds))
@@ -294,7 +294,7 @@ mod tests {
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: vec![Law::Damping, Law::Stiffness],
+            structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
         };
         let records = vec![record(0, NODES), record(1, nodes)];
         Problem::new(system, functions.expect("functions"), records).unwrap()

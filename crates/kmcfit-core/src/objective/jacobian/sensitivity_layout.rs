@@ -42,7 +42,7 @@ impl<'a> SensitivityLayout<'a> {
             column_of[*j] = column;
         }
         let scalars = functions.scalar_range().start;
-        let estimated = experiment.initial_parameters.into_iter().enumerate();
+        let estimated = experiment.initial_parameters.iter().copied().enumerate();
         let initial_states =
             estimated.filter_map(|(state, index)| Some((state, column_of[scalars + index?])));
         let assembly = functions.coefficient_set(experiment.coefficient_set);

@@ -12,7 +12,7 @@ use crate::solvers::settings::FitSettings;
 use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::{Fit, fit, fit_from};
 use crate::step::tangents::TILE;
-use crate::structure::Law;
+use crate::structure::{Law, Structure};
 use crate::system::{Excitation, Grid, Method, State, System};
 use crate::threads;
 
@@ -64,8 +64,8 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let between = times.iter().step_by(50).map(|t| t + 0.3 * grid.step());
     let between = between.filter(|t| *t < grid.duration()).collect();
     let record = Experiment {
-        initial_parameters: [None, Some(0)],
-        ..Experiment::free("driven", State::default(), nodes)
+        initial_parameters: vec![None, Some(0)],
+        ..Experiment::free("driven", State::rest(1), nodes)
             .with_excitation(Excitation::force_at_nodes(&force))
             .with_channel(channel(ChannelKind::Displacement, sevenths))
             .with_channel(channel(ChannelKind::Velocity, between))
@@ -74,7 +74,7 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let system = System {
         grid,
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     let functions = functions.with_scalars(vec![speed]);
     Problem::new(system, functions, vec![record]).unwrap()

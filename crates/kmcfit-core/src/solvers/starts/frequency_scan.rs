@@ -137,7 +137,7 @@ fn transferred(from: &Problem, theta: &[f64], to: &Problem) -> Vec<f64> {
 fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<f64>> {
     let functions = &constants.functions;
     let set = functions.coefficient_set(0);
-    let terms = &problem.system.terms;
+    let terms = problem.system.laws();
     let at = |kind: Law| {
         terms
             .iter()

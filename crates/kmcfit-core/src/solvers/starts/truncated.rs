@@ -107,8 +107,8 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
     let channels = experiment.channels.iter();
     Experiment {
         name: experiment.name.clone(),
-        initial: experiment.initial,
-        initial_parameters: experiment.initial_parameters,
+        initial: experiment.initial.clone(),
+        initial_parameters: experiment.initial_parameters.clone(),
         excitation: (experiment.excitation.as_ref()).map(|all| all.first(steps)),
         input: Input::default(),
         input_error: None,
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
     use crate::functions::CoefficientKind;
     use crate::record::{Channel, Weighting};
-    use crate::structure::Law;
+    use crate::structure::{Law, Structure};
     use crate::system::Method;
     use crate::system::State;
 
@@ -247,15 +247,12 @@ mod tests {
         let samples = vec![0.0; nodes.div_ceil(stride)];
         let weighting = Weighting::Sigma(1.0);
         let channel = Channel::displacement_at_nodes(samples, stride, weighting, &grid);
-        let start = State {
-            displacement: 1.0,
-            velocity: 0.0,
-        };
+        let start = State::one(1.0, 0.0);
         let record = Experiment::free("decay", start, nodes).with_channel(channel);
         let system = System {
             grid,
             method: Method::Rk4,
-            terms: vec![Law::Damping, Law::Stiffness],
+            structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
         };
         Problem::new(system, functions, vec![record]).expect("a problem")
     }

@@ -57,7 +57,7 @@ fn beginning(experiment: &Experiment) -> Experiment {
     let channels = experiment.channels.iter();
     Experiment {
         channels: channels.filter_map(|c| c.within(MOST_NODES - 1)).collect(),
-        ..Experiment::free(&*experiment.name, experiment.initial, MOST_NODES)
+        ..Experiment::free(&*experiment.name, experiment.initial.clone(), MOST_NODES)
     }
 }
 

@@ -79,10 +79,7 @@ pub fn kinematics(
     let begins = channels
         .iter()
         .any(|c| c.channel.times()[0] - grid.start() <= GAP * c.spacing());
-    let initial = begins.then(|| State {
-        displacement: y[0],
-        velocity: v[0],
-    });
+    let initial = begins.then(|| State::one(y[0], v[0]));
     let at_chosen = |f: &[f64]| chosen.iter().map(|&i| f[i]).collect();
     (chosen.len() >= POINTS).then(|| Kinematics {
         y: at_chosen(&y),

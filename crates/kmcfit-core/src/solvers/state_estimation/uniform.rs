@@ -34,10 +34,7 @@ pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinemat
     Some(Kinematics {
         nodes: (2..y.len() - 2).map(|i| first_node + i * spacing).collect(),
         y: inner,
-        initial: Some(State {
-            displacement: y[0] - back * slope,
-            velocity: slope - back * a[0],
-        }),
+        initial: Some(State::one(y[0] - back * slope, slope - back * a[0])),
         v,
         a,
         size: y.iter().fold(0.0f64, |m, y| m.max(y.abs())),
@@ -351,7 +348,7 @@ mod tests {
             }
             let initial = found.initial.expect("a sample at the first node");
             let [y, v, _] = quartic(0.0);
-            assert!(is_close(initial.displacement, y) && is_close(initial.velocity, v));
+            assert!(is_close(initial.displacement(0), y) && is_close(initial.velocity(0), v));
         }
     }
 

@@ -5,17 +5,14 @@ use super::super::error::{SimulationError, at};
 use super::super::{CoefficientGradient, Trajectory};
 use super::{Motion, MotionError};
 use crate::simd::LANES;
-use crate::structure::{Ends, Law, Structure};
 use crate::system::{StageSamples, State};
 
 impl Driven<'_> {
     fn with_motion<R>(self, call: impl FnOnce(&Motion) -> R) -> R {
-        let elements = self.system.terms.iter().map(|law| (*law, Ends::ground(0)));
-        let structure = Structure::one(elements.collect::<Vec<(Law, Ends)>>());
         // Functions of terms without coefficients are zero.
-        let zeros = vec![0.0; self.nodal.mass.len()];
+        let zeros = vec![0.0; self.nodal.inertias[0].len()];
         let given: Vec<&[f64]> = self.nodal.functions().collect();
-        let functions: Vec<&[f64]> = (0..=self.system.terms.len())
+        let functions: Vec<&[f64]> = (0..=self.system.laws().len())
             .map(|f| given.get(f).map_or(zeros.as_slice(), |values| values))
             .collect();
         let one = |part: fn(&crate::system::Excitation) -> &Option<StageSamples>| {
@@ -26,7 +23,7 @@ impl Driven<'_> {
         };
         let (force, base) = (one(|e| &e.force), one(|e| &e.base));
         call(&Motion {
-            structure: &structure,
+            structure: &self.system.structure,
             method: self.system.method,
             step: self.system.grid.step(),
             functions: &functions,
@@ -43,11 +40,10 @@ impl Driven<'_> {
     /// [`Driven::respond`] by the assembled structure.
     pub(in crate::step) fn respond_assembled(
         self,
-        initial: State,
+        initial: &State,
         trajectory: &mut Trajectory,
     ) -> Result<(), SimulationError> {
-        let x = [initial.displacement, initial.velocity];
-        self.with_motion(|motion| motion.respond(&x, trajectory))
+        self.with_motion(|motion| motion.respond(initial.components(), trajectory))
             .map_err(|error| self.failed(error))
     }
 
@@ -58,8 +54,8 @@ impl Driven<'_> {
         source: &Trajectory,
         gradient: CoefficientGradient,
     ) -> State {
-        let nodes = self.nodal.mass.len();
-        let mut all = vec![vec![0.0; nodes]; 1 + self.system.terms.len()];
+        let nodes = self.nodal.inertias[0].len();
+        let mut all = vec![vec![0.0; nodes]; 1 + self.system.laws().len()];
         let mut columns: Vec<&mut [f64]> = all.iter_mut().map(Vec::as_mut_slice).collect();
         let initial = self.with_motion(|motion| motion.adjoint(trajectory, source, &mut columns));
         match gradient {
@@ -75,10 +71,7 @@ impl Driven<'_> {
             }
         }
         let initial = initial.unwrap_or_else(|_| vec![f64::NAN; 2]);
-        State {
-            displacement: initial[0],
-            velocity: initial[1],
-        }
+        State::one(initial[0], initial[1])
     }
 
     /// [`Driven::linearise`] by the assembled structure; not a number where a step has no solution.

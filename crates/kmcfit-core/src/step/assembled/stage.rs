@@ -98,7 +98,7 @@ impl<T: Scalar> Stage<T> {
             v: vec![zero; all],
             a: vec![zero; all],
             phi: vec![zero; structure.functions()],
-            slopes: vec![[zero; 2]; structure.elements().len()],
+            slopes: vec![[zero; 2]; structure.laws().len()],
             matrix: Banded::zeros(n, structure.bandwidth(), zero),
             factorised: Vec::new(),
             work: vec![zero; n],
@@ -222,7 +222,7 @@ impl<T: Scalar> Stage<T> {
             let force = self.values.functions[f] * self.phi[f];
             ends.spread(zero - force, &mut self.work);
         }
-        for (e, (law, ends)) in structure.elements().iter().enumerate() {
+        for (e, (law, ends)) in structure.elements().enumerate() {
             let phi = law.phi(ends.across(&self.q), ends.across(&self.v));
             self.phi[count + e] = phi;
             let force = self.values.functions[count + e] * phi;
@@ -246,7 +246,7 @@ impl<T: Scalar> Stage<T> {
     pub fn linearise(&mut self, structure: &Structure) {
         self.accelerations_of_inertias(structure);
         let count = structure.inertias().len();
-        for (e, (law, ends)) in structure.elements().iter().enumerate() {
+        for (e, (law, ends)) in structure.elements().enumerate() {
             let (x, r) = (ends.across(&self.q), ends.across(&self.v));
             self.phi[count + e] = law.phi(x, r);
             self.set_slopes(e, count, law.slopes(x, r));
@@ -277,7 +277,7 @@ impl<T: Scalar> Stage<T> {
                 .add(structure.pattern(f), self.values.functions[f]);
         }
         if h != 0.0 {
-            for (e, (law, ends)) in structure.elements().iter().enumerate() {
+            for (e, (law, ends)) in structure.elements().enumerate() {
                 self.set_slopes(
                     e,
                     count,
@@ -345,7 +345,7 @@ impl Stage<f64> {
             shares.functions[f] = -across * self.phi[f];
             ends.spread(-across * self.values.functions[f], &mut shares.frames);
         }
-        for (e, (_, ends)) in structure.elements().iter().enumerate() {
+        for (e, (_, ends)) in structure.elements().enumerate() {
             let across = of_coordinates(ends.entries(), &self.work);
             shares.functions[count + e] = -across * self.phi[count + e];
             let [slope_q, slope_v] = self.slopes[e];
@@ -375,7 +375,7 @@ impl Stage<f64> {
             let force = self.values.functions[f] * frame + changes.functions[f] * self.phi[f];
             ends.spread(-force, &mut self.work);
         }
-        for (e, (_, ends)) in structure.elements().iter().enumerate() {
+        for (e, (_, ends)) in structure.elements().enumerate() {
             let [slope_q, slope_v] = self.slopes[e];
             let [dq, dv] = [q, v].map(|x| of_coordinates(ends.entries(), x));
             let force = slope_q * (dq + h * dv) + slope_v * dv;

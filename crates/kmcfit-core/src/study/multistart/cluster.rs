@@ -53,7 +53,8 @@ fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> f64 {
         let (one, two) = (a.nodal_of(which), b.nodal_of(which));
         for (j, (p, q)) in one.coefficients.iter().zip(&two.coefficients).enumerate() {
             let size = natural[assembly[j + 1]] / natural[assembly[0]];
-            let changes = (0..p.len()).map(|i| p[i] / one.mass[i] - q[i] / two.mass[i]);
+            let changes =
+                (0..p.len()).map(|i| p[i] / one.inertias[0][i] - q[i] / two.inertias[0][i]);
             ratios = ratios.max(relative(rms(changes), size));
         }
     }

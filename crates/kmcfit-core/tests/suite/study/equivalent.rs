@@ -1,5 +1,5 @@
 use kmcfit_core::internals::qp::ConicStatus;
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::study::equivalent_coefficients::{
     EquivalentOptions, TargetResponse, equivalent_coefficients,
 };
@@ -7,23 +7,22 @@ use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const INITIAL: State = State {
-    displacement: 3.3,
-    velocity: 1.0,
-};
+fn initial() -> State {
+    State::one(3.3, 1.0)
+}
 
 fn system(nodes: usize, method: Method) -> System {
     System {
         grid: Grid::new(0.0, 12.0, nodes).unwrap(),
         method,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
 fn truth(grid: &Grid) -> NodalCoefficients {
     let each = |f: &dyn Fn(f64) -> f64| grid.times().iter().map(|t| f(*t)).collect();
     NodalCoefficients {
-        mass: each(&|t| 1.0 - 0.03 * t),
+        inertias: vec![each(&|t| 1.0 - 0.03 * t)],
         coefficients: vec![each(&|_| 0.1), each(&|t| 1.0 + 0.1 * (0.5 * t).sin())],
     }
 }
@@ -35,7 +34,7 @@ fn force(grid: &Grid) -> Excitation {
 
 /// The true response at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
 fn response(nodes: usize) -> TargetResponse {
-    response_from(INITIAL, nodes)
+    response_from(initial(), nodes)
 }
 
 fn response_from(initial: State, nodes: usize) -> TargetResponse {
@@ -43,13 +42,13 @@ fn response_from(initial: State, nodes: usize) -> TargetResponse {
     let nodal = truth(&fine.grid);
     let excitation = force(&fine.grid);
     let forces = excitation.force.as_ref().unwrap().at_nodes();
-    let moved = fine.forward(&nodal, initial, Some(&excitation)).unwrap();
+    let moved = fine.forward(&nodal, &initial, Some(&excitation)).unwrap();
     let pick = |f: &[f64]| -> Vec<f64> { f.iter().step_by(32).copied().collect() };
     let (y, v) = (moved.displacement(0), moved.velocity(0));
     let acceleration: Vec<f64> = (0..y.len())
         .map(|i| {
             let [c, k] = [0, 1].map(|j| nodal.coefficients[j][i]);
-            (forces[i] - c * v[i] - k * y[i]) / nodal.mass[i]
+            (forces[i] - c * v[i] - k * y[i]) / nodal.inertias[0][i]
         })
         .collect();
     TargetResponse {
@@ -87,14 +86,18 @@ fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, TargetResponse) {
     let mass = random_mass(seed, &response.grid);
     let options = EquivalentOptions::near(vec![0.1; nodes], 0.05);
     let nodal = equivalent_coefficients(&mass, &response, &options).unwrap();
-    (response_error(&nodal, &response, INITIAL), nodal, response)
+    (
+        response_error(&nodal, &response, initial()),
+        nodal,
+        response,
+    )
 }
 
 /// Largest difference of the response of `nodal` from `initial` by the midpoint rule.
 fn response_error(nodal: &NodalCoefficients, response: &TargetResponse, initial: State) -> f64 {
     let excitation = Excitation::force_at_nodes(&response.force);
     let system = system(response.grid.nodes(), Method::Midpoint);
-    let moved = system.forward(nodal, initial, Some(&excitation)).unwrap();
+    let moved = system.forward(nodal, &initial, Some(&excitation)).unwrap();
     let pairs = moved.displacement(0).iter().zip(&response.displacement);
     pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()))
 }
@@ -129,7 +132,7 @@ fn the_true_mass_and_damping_bring_the_true_stiffness() {
     let truth = truth(&response.grid);
     let mut options = EquivalentOptions::near(truth.coefficients[0].clone(), 0.05);
     options.least_damping = Some(0.0);
-    let nodal = equivalent_coefficients(&truth.mass, &response, &options).unwrap();
+    let nodal = equivalent_coefficients(&truth.inertias[0], &response, &options).unwrap();
     let errors = crate::common::errors(&nodal, &truth);
     println!("{errors:?}");
     // The penalty on k, 1e-9 of T^4 k''^2, changes it by some 1e-3.
@@ -156,11 +159,8 @@ fn impossible_responses_are_infeasible() {
 #[test]
 fn responses_from_turning_points_and_zero_crossings_have_equivalent_systems() {
     for [displacement, velocity] in [[3.3, 0.0], [0.0, 1.0]] {
-        let initial = State {
-            displacement,
-            velocity,
-        };
-        let response = response_from(initial, 801);
+        let initial = State::one(displacement, velocity);
+        let response = response_from(initial.clone(), 801);
         let mass: Vec<f64> = response
             .grid
             .times()
@@ -169,7 +169,7 @@ fn responses_from_turning_points_and_zero_crossings_have_equivalent_systems() {
             .collect();
         let options = EquivalentOptions::near(vec![0.1; 801], 0.05);
         let nodal = equivalent_coefficients(&mass, &response, &options).unwrap();
-        let error = response_error(&nodal, &response, initial);
+        let error = response_error(&nodal, &response, initial.clone());
         // The error of the midpoint rule, as with random masses.
         assert!(error < 1e-2, "{initial:?}: {error}");
     }

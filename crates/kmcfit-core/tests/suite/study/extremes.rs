@@ -1,5 +1,5 @@
 use super::problems::{linear, regular};
-use crate::common::{INITIAL, csv, paper_problem, paper_system, shared};
+use crate::common::{csv, initial, paper_problem, paper_system, shared};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{Basis, Penalty};
 use kmcfit_core::internals::problem::Problem;
@@ -132,7 +132,7 @@ fn extremes_of_the_paper_s_data_contain_the_truth_and_the_paper_s_optimum() {
     let problem = positive();
     let nodal = paper_system(NODES);
     let truth = [
-        &nodal.mass[..],
+        &nodal.inertias[0][..],
         &nodal.coefficients[0],
         &nodal.coefficients[1],
     ]
@@ -170,7 +170,7 @@ fn extremes_of_the_paper_s_data_contain_the_truth_and_the_paper_s_optimum() {
                 assert!(problem.constraints.hold(&end.parameters, 1e-9));
                 assert_eq!(
                     fresh.trajectories[0].displacement(0)[0],
-                    INITIAL.displacement
+                    initial().displacement(0)
                 );
             }
             let node = (time / problem.system.grid.step()) as usize;
@@ -235,7 +235,7 @@ fn roughness_limits_bound_the_extremes() {
     super::problems::bound(&mut problem, "k(0) = 1", k0, [1.0, 1.0]);
     let nodal = paper_system(NODES);
     let truth = [
-        &nodal.mass[..],
+        &nodal.inertias[0][..],
         &nodal.coefficients[0],
         &nodal.coefficients[1],
     ]
@@ -258,7 +258,7 @@ fn roughness_limits_bound_the_extremes() {
             ends.map(|e| (e.value, e.ended, e.programs)),
             clock.elapsed().as_secs_f64()
         );
-        let exact = nodal.mass[(15.0 / grid.step()) as usize];
+        let exact = nodal.inertias[0][(15.0 / grid.step()) as usize];
         assert!(band.low.value < exact && exact < band.high.value);
         for end in ends {
             assert!(end.misfit <= 0.0114);
@@ -311,7 +311,7 @@ fn an_exact_fit_of_penalised_functions_has_no_range() {
     let mut problem = paper_problem(n, [2.0, 1.0, 1.0]);
     let truth = paper_system(n);
     let theta = [
-        truth.mass.clone(),
+        truth.inertias[0].clone(),
         truth.coefficients[0].clone(),
         truth.coefficients[1].clone(),
     ];

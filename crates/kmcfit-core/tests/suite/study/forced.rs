@@ -88,14 +88,7 @@ fn within(seed: u64, varies: bool) -> [usize; 2] {
     let [times, force, noisy] = record(seed, 11, samples, varies);
     let end = times[times.len() - 1];
     let grid = Grid::new(0.0, end, 4 * (samples - 1) + 1).unwrap();
-    let mut experiment = Experiment::free(
-        "new",
-        State {
-            displacement: 0.0,
-            velocity: 0.0,
-        },
-        grid.nodes(),
-    );
+    let mut experiment = Experiment::free("new", State::one(0.0, 0.0), grid.nodes());
     let signal = Signal::new(times.clone(), force, Interpolation::Linear).unwrap();
     experiment.input = Input {
         force: Some(Waveform::Samples(signal)),

@@ -1,4 +1,4 @@
-use super::problems::{REST, Record, bound, constants, nodal, problem, samples, system};
+use super::problems::{Record, bound, constants, nodal, problem, rest, samples, system};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::study::multistart::{Multistart, Ranges, multistart};
@@ -7,7 +7,7 @@ use kmcfit_core::internals::study::multistart::{Multistart, Ranges, multistart};
 /// `2 pi j +- w` give the same samples. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
 pub fn aliased(noise: f64) -> Problem {
     let system = system(6.0, 601);
-    assert_eq!(REST.velocity, 0.0);
+    assert_eq!(rest().velocity(0), 0.0);
     let values = samples(&system, &nodal(601, [1.0, 0.0, 2.25]), None, 100, noise, 1);
     let list = constants(601, [None, None, Some(2.0)], [1.0, 0.0, 0.0]);
     let record = Record {

@@ -27,13 +27,7 @@ fn the_band_of_a_prediction_agrees_with_refits() {
         .collect();
     let run = PredictionCase {
         excitation: Some(Excitation::force_at_nodes(&force)),
-        ..PredictionCase::free(
-            "another state",
-            State {
-                displacement: -0.5,
-                velocity: 2.0,
-            },
-        )
+        ..PredictionCase::free("another state", State::one(-0.5, 2.0))
     };
     let level = MisfitLimit::of(best.evaluation.misfit + QUANTILE_95);
     let targets = [0, 1].map(|j| Target::Linear(Linear::parameter(j)));
@@ -108,7 +102,7 @@ fn systems_of_equal_fit_differ_in_prediction() {
     }
     let nodal = common::paper_system(nodes);
     let [c, k] = [0, 1].map(|j| &nodal.coefficients[j][..]);
-    let truth = [&nodal.mass[..], c, k].concat();
+    let truth = [&nodal.inertias[0][..], c, k].concat();
     let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
     let level = MisfitLimit {
         budgets: (0..3).map(|f| (rows(f), 1e-3)).collect(),
@@ -134,13 +128,7 @@ fn systems_of_equal_fit_differ_in_prediction() {
     }
     let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
     let distance = |displacement: f64, velocity: f64| {
-        let run = PredictionCase::free(
-            "other",
-            State {
-                displacement,
-                velocity,
-            },
-        );
+        let run = PredictionCase::free("other", State::one(displacement, velocity));
         let found = predict(&problem, &truth, &run, None, &extremes).unwrap();
         let worst = found.worst.unwrap();
         let response = found.response.displacement(0);

@@ -7,27 +7,26 @@ use kmcfit_core::internals::functions::{
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
-use kmcfit_core::internals::structure::Law;
+use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 pub const SIGMA: f64 = 0.05;
-pub const REST: State = State {
-    displacement: 1.0,
-    velocity: 0.0,
-};
+pub fn rest() -> State {
+    State::one(1.0, 0.0)
+}
 
 pub fn system(duration: f64, nodes: usize) -> System {
     System {
         grid: Grid::new(0.0, duration, nodes).unwrap(),
         method: Method::Rk4,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     }
 }
 
 /// One value for each function.
 pub fn nodal(nodes: usize, [m, c, k]: [f64; 3]) -> NodalCoefficients {
     NodalCoefficients {
-        mass: vec![m; nodes],
+        inertias: vec![vec![m; nodes]],
         coefficients: vec![vec![c; nodes], vec![k; nodes]],
     }
 }
@@ -60,7 +59,7 @@ pub fn samples(
     sigma: f64,
     seed: u64,
 ) -> Vec<f64> {
-    let response = system.forward(truth, REST, excitation).unwrap();
+    let response = system.forward(truth, &rest(), excitation).unwrap();
     let every: Vec<f64> = response
         .displacement(0)
         .iter()
@@ -82,9 +81,9 @@ pub fn problem(
     let channel =
         Channel::displacement_at_nodes(record.samples, record.stride, record.weighting, &grid)
             .with_sensor(record.sensor);
-    let mut experiment = Experiment::free("record", REST, grid.nodes()).with_channel(channel);
+    let mut experiment = Experiment::free("record", rest(), grid.nodes()).with_channel(channel);
     experiment.excitation = record.excitation;
-    experiment.initial_parameters = record.initial_parameters;
+    experiment.initial_parameters = record.initial_parameters.to_vec();
     Problem::new(system, functions.with_scalars(scalars), vec![experiment]).unwrap()
 }
 

@@ -216,7 +216,7 @@ fn a_nodal_function_has_a_profile() {
     let found = profile(&problem, &best.best.parameters, &q, &how).unwrap();
     println!("{} ({} fits)", found.sentence(), found.values.len());
     let [low, high] = found.interval.map(Option::unwrap);
-    let truth = nodal.mass[50];
+    let truth = nodal.inertias[0][50];
     assert!(low < truth && truth < high, "{low} {truth} {high}");
     for end in [low, high] {
         let i = found.values.iter().position(|v| *v == end).unwrap();

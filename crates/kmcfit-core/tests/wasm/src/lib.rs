@@ -22,7 +22,7 @@ fn estimates(times: &[f64], displacement: &[f64]) -> Option<[f64; 3]> {
     let builder = Builder::new(system).record(record);
     let fit = builder.method(Method::Midpoint).build().ok()?.fit().ok()?;
     let coefficients = &fit.best.evaluation.nodal;
-    let mass = &coefficients.mass;
+    let mass = &coefficients.inertias[0];
     (fit.outcome.status.name() == "converged")
         .then(|| [mass[0], mass[mass.len() - 1], coefficients.coefficients[0][0]])
 }

@@ -103,7 +103,7 @@ pub fn equation_balance(problem: &Problem, theta: &[f64]) -> Option<EquationBala
     if equations.list.is_empty() {
         return None;
     }
-    let terms = problem.system.terms.len();
+    let terms = problem.system.laws().len();
     let kinds = problem.functions.coefficient_set(0).iter();
     let kinds = kinds.map(|f| EquationPart::of(problem.functions.get(*f).quantity));
     let parts: Vec<EquationPart> = kinds.chain([EquationPart::Force]).collect();

@@ -60,7 +60,7 @@ impl<'a> Equation<'a> {
                 .map(|i| measured.response(problem, f, i))
                 .collect()
         };
-        let factors = (0..=problem.system.terms.len()).map(|f| measured.filtered(factor(f)));
+        let factors = (0..=problem.system.laws().len()).map(|f| measured.filtered(factor(f)));
         Self {
             experiment,
             measured,
@@ -84,7 +84,7 @@ impl<'a> Equation<'a> {
             .functions
             .coefficient_set(experiment.coefficient_set);
         let has_no_jump = (set.iter().zip(0..)).all(|(function, f)| {
-            let is_differentiated = f == 0 || problem.system.terms[f - 1] == Law::Damping;
+            let is_differentiated = f == 0 || problem.system.laws()[f - 1] == Law::Damping;
             !is_differentiated || is_continuous(problem.functions.get(*function))
         });
         let Some(plain) = measured.unsmoothed.as_ref().filter(|_| has_no_jump) else {
@@ -93,7 +93,7 @@ impl<'a> Equation<'a> {
         let state = &plain.state;
         let inertia = state.a.iter().zip(&plain.base).map(|(a, b)| a + b);
         equation.factors[0] = measured.filtered(inertia.collect());
-        for (term, factor) in problem.system.terms.iter().zip(&mut equation.factors[1..]) {
+        for (term, factor) in problem.system.laws().iter().zip(&mut equation.factors[1..]) {
             if term.is_linear() {
                 let pairs = state.y.iter().zip(&state.v);
                 *factor = measured.filtered(pairs.map(|(y, v)| term.phi(*y, *v)).collect());
@@ -216,7 +216,7 @@ impl<'a> Equation<'a> {
     /// Replaces the factors of nonlinear terms by those of the restored state at the parameters `theta`, where these lower the cost;
     /// true if they do.
     fn restore(&mut self, problem: &Problem, theta: &[f64]) -> bool {
-        let terms = &problem.system.terms;
+        let terms = problem.system.laws();
         let is_nonlinear = |term: &Law| !term.is_linear() && *term != Law::Offset;
         if self.bumps.is_none() || !terms.iter().any(is_nonlinear) {
             return false;

@@ -64,7 +64,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
             counts.qp = programs;
             let point = cost.point(minimum.parameters.clone());
             let nodal = &point.evaluation.nodal;
-            let has_mass = nodal.mass.iter().all(|m| *m > 0.0);
+            let has_mass = nodal.inertias[0].iter().all(|m| *m > 0.0);
             let reason = reason(problem, &minimum, has_mass);
             let status = match minimum.program {
                 Some(ConicStatus::Almost) => Status::Stalled,

@@ -45,7 +45,7 @@ impl Measurements {
     /// Notes on lost information: the filter that integrates an acceleration removes slow components, which biases forces not
     /// proportional to the response.
     pub fn remarks(&self, problem: &Problem) -> Vec<String> {
-        let terms = problem.system.terms.iter();
+        let terms = problem.system.laws().iter();
         if terms.clone().all(|term| term.is_linear()) {
             return Vec::new();
         }

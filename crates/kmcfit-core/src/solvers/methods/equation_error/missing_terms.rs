@@ -34,10 +34,12 @@ const NOTICEABLE: f64 = 3e-3;
 /// Most terms that are added.
 const MOST_TERMS: usize = 2;
 
-/// Kinds of terms that are tested. A quadratic or quintic stiffness is not among them: beside the other terms its factor is close to
-/// that of a static force or of a cubic stiffness, whose names it would take.
-pub(crate) const TESTED_TERMS: [CoefficientKind; 4] = [
+/// Kinds of terms that are tested. The factor of a quadratic or quintic stiffness is close to that of a static force or of a cubic stiffness,
+/// whose names it would take where no refit compares them: the weak form tests a quintic beside a cubic alone.
+pub(crate) const TESTED_TERMS: [CoefficientKind; 6] = [
+    CoefficientKind::QuadraticStiffness,
     CoefficientKind::CubicStiffness,
+    CoefficientKind::QuinticStiffness,
     CoefficientKind::QuadraticDamping,
     CoefficientKind::CoulombFriction,
     CoefficientKind::Offset,
@@ -123,7 +125,14 @@ fn candidates(problem: &Problem, equations: &Equations) -> Vec<Candidate> {
     kinds
         // The filter of an acceleration removes a static force.
         .filter(|kind| {
-            let is_tested = *kind == CoefficientKind::Stiffness || !is_there(*kind);
+            let is_tested = match kind {
+                CoefficientKind::Stiffness => true,
+                CoefficientKind::QuadraticStiffness => false,
+                CoefficientKind::QuinticStiffness => {
+                    is_there(CoefficientKind::CubicStiffness) && !is_there(*kind)
+                }
+                kind => !is_there(*kind),
+            };
             is_tested && !(in_bands && *kind == CoefficientKind::Offset)
         })
         .filter_map(|kind| {

@@ -210,10 +210,10 @@ fn root_weight(
 ) -> f64 {
     let nodal = nodal(problem, experiment, start);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let terms = problem.system.terms.iter().zip(&nodal.coefficients);
+    let terms = problem.system.laws().iter().zip(&nodal.coefficients);
     let springs = terms.filter(|(term, _)| **term == Law::Stiffness);
     let springs = springs.map(|(_, k)| size(k) * size(&kinematics.y));
-    let force_scale = springs.fold(size(&nodal.mass) * size(&kinematics.a), f64::max)
+    let force_scale = springs.fold(size(&nodal.inertias[0]) * size(&kinematics.a), f64::max)
         / kinematics.size.max(f64::MIN_POSITIVE);
     kinematics.weight.sqrt() / force_scale
 }
@@ -257,8 +257,7 @@ fn scale_row(
     }
     let grid = &problem.system.grid;
     let mut ones = problem.functions.empty_nodal();
-    ones.mass
-        .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
+    ones.inertias[0].copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
     let row = problem.functions.transpose(&ones).into_iter().enumerate();
     Some(row.filter(|(_, a)| *a != 0.0).collect())
 }
@@ -298,11 +297,11 @@ fn with_initial_states(
     let mut theta = start.to_vec();
     let first = problem.functions.scalar_range().start;
     for (experiment, measured_states) in problem.experiments.iter().zip(kinematics) {
-        let Some(state) = measured_states.as_ref().and_then(|m| m.initial) else {
+        let Some(state) = measured_states.as_ref().and_then(|m| m.initial.clone()) else {
             continue;
         };
-        let values = [state.displacement, state.velocity];
-        for (index, value) in experiment.initial_parameters.into_iter().zip(values) {
+        let values = [state.displacement(0), state.velocity(0)];
+        for (index, value) in experiment.initial_parameters.iter().zip(values) {
             if let Some(index) = index {
                 theta[first + index] = value;
             }

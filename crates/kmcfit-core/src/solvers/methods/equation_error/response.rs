@@ -44,7 +44,7 @@ impl Measured {
     pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
         match f {
             0 => self.a[i] + self.base[i],
-            term => problem.system.terms[term - 1].phi(self.y[i], self.v[i]),
+            term => problem.system.laws()[term - 1].phi(self.y[i], self.v[i]),
         }
     }
 
@@ -122,7 +122,8 @@ impl Measured {
         let [gain, ..] = channel.sensor().values(view.scalars);
         let mut predicted = channel.observed().to_vec();
         for (i, error) in self.errors(problem, view.nodal).iter().enumerate() {
-            predicted[self.first + i] -= gain * error / blend(&view.nodal.mass, self.places[i]);
+            predicted[self.first + i] -=
+                gain * error / blend(&view.nodal.inertias[0], self.places[i]);
         }
         predicted
     }

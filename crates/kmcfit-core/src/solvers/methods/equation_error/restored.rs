@@ -46,10 +46,10 @@ pub(super) fn restored(
     let [mut y, mut v] = [measured.y.clone(), measured.v.clone()];
     for _ in 0..ROUNDS {
         let acceleration = measured.places.iter().enumerate().map(|(i, place)| {
-            let terms = problem.system.terms.iter().zip(&nodal.coefficients);
+            let terms = problem.system.laws().iter().zip(&nodal.coefficients);
             let forces = terms.map(|(term, p)| blend(p, *place) * term.phi(y[i], v[i]));
             let force = inputs.force[i] - forces.sum::<f64>();
-            force / blend(&nodal.mass, *place) - inputs.base[i]
+            force / blend(&nodal.inertias[0], *place) - inputs.base[i]
         });
         let acceleration: Vec<f64> = acceleration.collect();
         v = sum(&low_v, &high(integral(&acceleration, measured.weight))?);

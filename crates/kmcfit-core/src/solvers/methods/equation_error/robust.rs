@@ -109,10 +109,7 @@ mod tests {
     fn residuals_without_a_scale_are_squared() {
         let loss = huber().scaled_by(&[0.0, 0.0, 2.0]);
         assert_eq!((loss.cost(2.0), loss.weight(2.0)), (4.0, 1.0));
-        let rest = State {
-            displacement: 0.0,
-            velocity: 0.0,
-        };
+        let rest = State::one(0.0, 0.0);
         let none = ResidualLoss::of(&Experiment::free("none", rest, 3));
         assert!(!none.is_robust());
         assert_eq!(none.scaled_by(&[1.0, 2.0]), ResidualLoss::squares());

@@ -140,7 +140,7 @@ fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
     fits.then(|| SearchRay {
         functions: parts(&point.parameters),
         direction: parts(&point.gradient.l2),
-        initial: experiment.initial,
+        initial: &experiment.initial,
         samples: channel.observed(),
         step: system.grid.step(),
     })

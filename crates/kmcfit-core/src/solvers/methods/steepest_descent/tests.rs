@@ -4,7 +4,7 @@ use crate::objective::GradientKind;
 use crate::record::{Channel, Experiment};
 use crate::solvers::{FitSettings, Solver};
 use crate::step::EngineMode;
-use crate::structure::Law;
+use crate::structure::{Law, Structure};
 use crate::system::{Grid, Method, State, System};
 
 const NODES: usize = 401;
@@ -15,7 +15,7 @@ fn problem() -> Problem {
     let system = System {
         grid,
         method: Method::Midpoint,
-        terms: vec![Law::Damping, Law::Stiffness],
+        structure: Structure::one(vec![Law::Damping, Law::Stiffness]),
     };
     let nodal = |quantity, start: f64| {
         CoefficientFunction::free(quantity, Basis::Nodal, &grid, vec![start; NODES])
@@ -31,10 +31,7 @@ fn problem() -> Problem {
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
     let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
-    let initial = State {
-        displacement: 1.0,
-        velocity: 0.0,
-    };
+    let initial = State::one(1.0, 0.0);
     let experiment = Experiment::free("decay", initial, NODES).with_channel(channel);
     Problem::new(system, functions, vec![experiment]).unwrap()
 }

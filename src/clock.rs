@@ -4,7 +4,7 @@ use crate::units::{Quantity, Unit};
 
 /// A time of day, with its date where it is stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Clock {
+pub(crate) struct Clock {
     /// Days since 1970-01-01.
     day: Option<i64>,
     /// Seconds of the day.
@@ -14,14 +14,14 @@ pub(super) struct Clock {
 }
 
 /// Seconds of a day.
-pub(super) const DAY: f64 = 86_400.0;
+pub(crate) const DAY: f64 = 86_400.0;
 const MONTHS: [&str; 12] = [
     "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
 ];
 
 impl Clock {
     /// Reads `23:59:58.5`, `11:59:58,5 PM`, `59:58.5`, and one of these after a date `2024-01-10`, `2024/01/10`, `10.01.2024`,
-    /// `10-Jan-2024` or `01/10/2024` or after `2 days`, parted by a blank or `T`; a time zone behind it is the same in all rows. Reads
+    /// `10-Jan-2024` or `01/10/2024` or after `2 days`, parted by a blank or `T`; a time zone behind it counts. Reads
     /// `0.5 sec` as well.
     pub fn read(text: &str, day_first: bool) -> Option<Self> {
         let text = text.trim_matches(['"', '\'', ' ']);
@@ -47,15 +47,11 @@ impl Clock {
         let end = time.find(|c: char| !(c.is_ascii_digit() || ":.,".contains(c)));
         let (time, zone) = time.split_at(end.unwrap_or(time.len()));
         let zone = zone.trim();
-        let afternoon = match zone.to_ascii_lowercase().as_str() {
-            "am" => Some(0.0),
-            "pm" => Some(0.5 * DAY),
-            "" | "z" | "utc" | "gmt" => None,
-            other => {
-                let is_offset = other.starts_with(['+', '-'])
-                    && other[1..].bytes().all(|b| b.is_ascii_digit() || b == b':');
-                is_offset.then_some(None)?
-            }
+        let (afternoon, offset) = match zone.to_ascii_lowercase().as_str() {
+            "am" => (Some(0.0), 0.0),
+            "pm" => (Some(0.5 * DAY), 0.0),
+            "" | "z" | "utc" | "gmt" => (None, 0.0),
+            other => (None, offset(other)?),
         };
         let date = date.trim_end_matches(['T', ' ', '_', ',', '+']);
         // Durations of pandas.
@@ -83,6 +79,8 @@ impl Clock {
         };
         let twelve = afternoon.is_some() && seconds >= 0.5 * DAY;
         let seconds = seconds + afternoon.unwrap_or(0.0) - if twelve { 0.5 * DAY } else { 0.0 };
+        // A zone without a date changes nothing but the same seconds of all rows.
+        let seconds = seconds - if day.is_some() { offset } else { 0.0 };
         Some(Self {
             day,
             seconds,
@@ -96,17 +94,39 @@ impl Clock {
         DAY * days as f64 + (self.seconds - first.seconds)
     }
 
-    /// Adds a day after each midnight to times without dates.
+    /// Seconds since 1970, or of the day.
+    pub fn absolute(&self) -> f64 {
+        DAY * self.day.unwrap_or(0) as f64 + self.seconds
+    }
+
+    /// Adds a day after each midnight to times without dates, and half a day where a clock of twelve hours begins again.
     pub fn over_midnights(&self, times: &mut [f64]) {
         let (mut days, mut before) = (0.0, f64::NEG_INFINITY);
         for time in times.iter_mut().filter(|_| self.day.is_none()) {
-            if *time < before - 0.5 * DAY {
+            if *time < before - 0.75 * DAY {
                 days += DAY;
+            } else if *time < before - 0.49 * DAY {
+                days += 0.5 * DAY;
             }
             before = *time;
             *time += days;
         }
     }
+}
+
+/// Seconds east of Greenwich: `+01:00`, `-0530`, `+2`.
+fn offset(zone: &str) -> Option<f64> {
+    let sign = if zone.starts_with('-') { -1.0 } else { 1.0 };
+    let digits = zone.strip_prefix(['+', '-'])?.replace(':', "");
+    let number: f64 = Some(&digits)
+        .filter(|d| d.bytes().all(|b| b.is_ascii_digit()))?
+        .parse()
+        .ok()?;
+    let (hours, minutes) = match digits.len() {
+        1 | 2 => (number, 0.0),
+        _ => ((number / 100.0).floor(), number % 100.0),
+    };
+    Some(sign * (3600.0 * hours + 60.0 * minutes))
 }
 
 /// Days since 1970-01-01 of a date, and the order of one with slashes: year first, else day first with points and lines, day or month first
@@ -162,7 +182,7 @@ mod tests {
             ("12:00:01 AM", of(0, 1.0)),
             ("1:00:00 pm", of(0, 46800.0)),
             ("1970-01-02T00:00:01Z", of(1, 1.0)),
-            ("2024-03-01 00:00:00.5+01:00", of(19783, 0.5)),
+            ("2024-03-01 01:00:00.5+01:00", of(19783, 0.5)),
             ("01.03.2024 00:00:00,5", of(19783, 0.5)),
             ("3/1/2024 00:00:00", of(19783, 0.0)),
             ("2024/02/29 12:00", of(19782, 43200.0)),

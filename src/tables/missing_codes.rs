@@ -1,6 +1,6 @@
 //! Codes that stand for missing samples in a file: -9999, 9999, -7999, and values that repeat far outside all others.
 
-use crate::tables::Table;
+use super::Table;
 use kmcfit_core::internals::signal::median;
 
 /// Sizes that loggers and archives write for missing samples.
@@ -18,15 +18,12 @@ const MOST: usize = 4;
 /// Codes in the columns of a table with these indices, in the unit of the file, with their numbers.
 ///
 /// A column of an input, as the bool says, can hold a single large value: a blow between quiet samples.
-pub(super) fn codes(
-    table: &Table,
-    columns: impl Iterator<Item = (usize, bool)>,
-) -> Vec<(f64, usize)> {
+pub fn codes(table: &Table, columns: impl Iterator<Item = (usize, bool)>) -> Vec<(f64, usize)> {
     let mut found: Vec<(f64, usize)> = Vec::new();
     for (index, is_input) in columns {
         // A column that cannot be read has its own message.
         let values = table.samples(index).unwrap_or_default();
-        for (code, count) in of_column(values, is_input) {
+        for (code, count) in codes_of_column(values, is_input) {
             match found.iter_mut().find(|(known, _)| *known == code) {
                 Some((_, all)) => *all += count,
                 None => found.push((code, count)),
@@ -36,7 +33,8 @@ pub(super) fn codes(
     found
 }
 
-fn of_column(values: &[f64], is_input: bool) -> Vec<(f64, usize)> {
+/// Codes in a column, in the unit of the file, with their numbers.
+pub fn codes_of_column(values: &[f64], is_input: bool) -> Vec<(f64, usize)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     if sorted.is_empty() {
         return Vec::new();
@@ -87,7 +85,7 @@ mod tests {
             for (i, code) in codes.iter().enumerate() {
                 values[17 * i] = *code;
             }
-            of_column(&values, false)
+            codes_of_column(&values, false)
         };
         assert_eq!(with(2.0, &[-9999.0]), [(-9999.0, 1)]);
         assert_eq!(
@@ -101,11 +99,11 @@ mod tests {
         assert_eq!(with(2.0, &[32767.0]), [(32767.0, 1)]);
         let mut blow = wave(1e-3);
         blow[20] = 500.0;
-        assert_eq!(of_column(&blow, true), []);
+        assert_eq!(codes_of_column(&blow, true), []);
         // A single spike is none, nor is a code within the range of the samples.
         assert_eq!(with(2.0, &[1234.5]), []);
         assert_eq!(with(5000.0, &[9999.0]), []);
         assert_eq!(with(2.0, &[]), []);
-        assert_eq!(of_column(&[f64::NAN; 3], false), []);
+        assert_eq!(codes_of_column(&[f64::NAN; 3], false), []);
     }
 }
