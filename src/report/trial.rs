@@ -1,8 +1,8 @@
 //! Advice is tried before it is given: each change of the model is fitted, and recommended only if the verdict or the criterion improves.
 //!
-//! A trial of other functions or nodes starts at the estimates of a fit that is converged and not inadequate. All trials together have as many iterations as the fit and its assessment take the time of,
-//! counted at the nodes of its grid, so that they take at most about its time; what does not fit into these is *not tried*. The number of
-//! iterations, not the time, is the limit: the same input gives the same advice on every machine.
+//! A trial of other functions or nodes starts at the estimates of a fit that is converged and not inadequate. All trials together have the
+//! iterations of the fit and those that take the time of its assessment, counted at the nodes of its grid; what does not fit into these is
+//! *not tried*. The number of iterations, not the time, is the limit: the same input gives the same advice on every machine.
 
 use super::document::ResultDocument;
 use super::fit_assessment::RunAssessment;
@@ -25,7 +25,7 @@ const SHORT: usize = 100_000;
 /// Decrease of BIC from which a change is worth it: odds of 20 to 1 (6 = 2 ln 20).
 const BETTER: f64 = 6.0;
 
-/// Most nodes of records with errors of an input in a trial: their filter costs about 0.4 ms a node in all iterations of a fit.
+/// Most nodes of records with errors of an input in a trial: their filter costs about 0.15 ms a node in all iterations of a fit.
 const MOST_FILTERED: usize = 8192;
 
 /// How much a change improves the fit: the levels of the verdict, then the decrease of the criterion.
