@@ -8,10 +8,11 @@ use crate::error::InputError;
 use crate::report::{
     CsvTable, Figure, ForcedPredictions, FreePredictions, Run, figures, json, render,
 };
-use crate::results::OutputFolder;
+use crate::results::{OutputFolder, read_lock};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
 use serde::Serialize;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Predict the response of an identified system to another force, motion of the base or initial state.
@@ -57,6 +58,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .map(|text| state(text))
         .collect::<Result<_, _>>()?;
     let reading = Activity::begin(format!("reading {}", arguments.run.display()));
+    // All that is read belongs to one run.
+    let lock = read_lock(&arguments.run);
     let run = open(&arguments.run)?;
     drop(reading);
     super::note_changes(&run);
@@ -67,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .transpose()
     };
     if files().next().is_some() {
-        return forced(arguments, &run, states, prepare);
+        return forced(arguments, &run, lock, states, prepare);
     }
     if !arguments.channel.is_empty() {
         return Err(InputError::argument(
@@ -78,13 +81,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .expected("`--force FILE` or `--base FILE` with `--channel`")
         .into());
     }
-    let folder = prepare()?;
     let predicting = Activity::begin(PREDICTING);
     let predictions = FreePredictions::of(&run, &states).map_err(|breakdown| {
         CommandError::Numerical(format!("--initial: no response: {breakdown}"))
     })?;
-    drop(predicting);
-    if let Some(folder) = folder {
+    drop((predicting, lock));
+    if let Some(folder) = prepare()? {
         let unit = if run.document.is_rotation() {
             "rad"
         } else {
@@ -119,6 +121,7 @@ fn open(path: &Path) -> Result<Run, InputError> {
 fn forced(
     arguments: &Arguments,
     run: &Run,
+    lock: Option<File>,
     mut states: Vec<State>,
     prepare: impl Fn() -> Result<Option<OutputFolder>, InputError>,
 ) -> Result<u8, CommandError> {
@@ -140,7 +143,7 @@ fn forced(
     let kinds: Vec<ChannelKind> = ChannelKind::ALL.into_iter().filter(wanted).collect();
     let predicting = Activity::begin(PREDICTING);
     let found = ForcedPredictions::of(run, &record, &states, &kinds)?;
-    drop(predicting);
+    drop((predicting, lock));
     let folder = prepare()?;
     let predictions = found.map_err(CommandError::Numerical)?;
     if let Some(folder) = folder {

@@ -46,6 +46,8 @@ const PER_NODE: u64 = 600;
 pub struct Run {
     /// Its folder.
     pub folder: PathBuf,
+    /// Its copy of the model, as the folder was read; the error if there is none.
+    model: Result<String, InputError>,
     /// `result.json`.
     pub document: ResultDocument,
     /// The result document as JSON, unknown keys of later versions included.
@@ -113,6 +115,7 @@ impl Run {
         let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
         Ok(Self {
             folder: folder.to_path_buf(),
+            model: read_text(&folder.join(MODEL), "the model of a run", LONGEST_DOCUMENT),
             coefficients: coefficients(&functions, "", &quantities, nodes, steps)?,
             truth: has_truth
                 .then(|| coefficients(&functions, "true_", &quantities, nodes, steps))
@@ -147,8 +150,8 @@ impl Run {
             .filter(|(path, sha256)| !is_same(path, sha256))
             .map(|(path, _)| (path, false))
             .collect();
-        let own = digest_of_file(&self.folder.join(MODEL)).unwrap_or_default();
-        if !is_same(&model, &own) {
+        let own = self.value["files"][MODEL].as_str().unwrap_or_default();
+        if !is_same(&model, own) {
             changed.push((model, true));
         }
         changed
@@ -195,11 +198,7 @@ impl Run {
     /// # Errors
     /// If the copy is missing or damaged.
     pub fn own_model(&self) -> Result<ModelFile, InputError> {
-        let text = read_text(
-            &self.folder.join(MODEL),
-            "the model of a run",
-            LONGEST_DOCUMENT,
-        )?;
+        let text = self.model.clone()?;
         let overrides = Override::parse_all(&self.document.model.overrides)?;
         ModelFile::parse(self.model_path(), text)?.with_overrides(&overrides)
     }

@@ -1,8 +1,8 @@
 //! Overlaid figures of several runs, each with its own line style and its own time grid.
 
 use super::ComparedRun;
-use crate::report::ResultTable;
 use crate::report::chart::{Colour, Dash, Figure, Mark, Panel, Style};
+use crate::report::{ResultTable, Run};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::system::NodalCoefficients;
 
@@ -72,42 +72,39 @@ fn overlay(runs: &[ComparedRun], (label, unit, of): &Quantity) -> Panel {
     panel.marks(bands).marks(truth).marks(curves)
 }
 
-/// A channel of a run, from its table in the folder of the run.
-struct Channel {
-    /// Index of the run.
-    run: usize,
+/// A channel of a validation record, from its table in the folder of the run.
+#[derive(Debug, Clone)]
+pub(super) struct Channel {
     /// Record, kind and unit, which channels of one panel have in common.
     key: [String; 3],
     table: ResultTable,
 }
 
-/// The channels of the validation records of all runs.
-fn channels(runs: &[ComparedRun]) -> Vec<Channel> {
+/// The channels of the validation records of a run.
+pub(super) fn channels(run: &Run) -> Vec<Channel> {
     let mut all = Vec::new();
-    for (i, run) in runs.iter().enumerate() {
-        for (number, record) in run.finished.document.validation.iter().enumerate() {
-            for channel in &record.channels {
-                let file = format!("channels/validation-{}-{}.csv", number + 1, channel.kind);
-                let table = ResultTable::read(&run.finished.folder.join(file));
-                all.extend(table.ok().map(|table| Channel {
-                    run: i,
-                    key: [
-                        record.name.clone(),
-                        channel.kind.clone(),
-                        channel.unit.clone(),
-                    ],
-                    table,
-                }));
-            }
+    for (number, record) in run.document.validation.iter().enumerate() {
+        for channel in &record.channels {
+            let file = format!("channels/validation-{}-{}.csv", number + 1, channel.kind);
+            let key = [&record.name, &channel.kind, &channel.unit];
+            let table = ResultTable::read(&run.folder.join(file)).ok();
+            all.extend(table.map(|table| Channel {
+                key: key.map(Clone::clone),
+                table,
+            }));
         }
     }
     all
 }
 
 /// A panel for each channel, with the prediction of each run that has it.
-fn panels(runs: &[ComparedRun], channels: &[Channel]) -> Vec<Panel> {
+fn panels(runs: &[ComparedRun]) -> Vec<Panel> {
+    let mut channels: Vec<(usize, &Channel)> = Vec::new();
+    for (i, run) in runs.iter().enumerate() {
+        channels.extend(run.validation.iter().map(|channel| (i, channel)));
+    }
     let mut keys: Vec<&[String; 3]> = Vec::new();
-    for channel in channels {
+    for (_, channel) in &channels {
         if !keys.contains(&&channel.key) {
             keys.push(&channel.key);
         }
@@ -117,13 +114,15 @@ fn panels(runs: &[ComparedRun], channels: &[Channel]) -> Vec<Panel> {
     };
     let panel = |key: &&[String; 3]| {
         let [record, kind, unit] = key;
-        let alike = || channels.iter().filter(|channel| channel.key == **key);
+        let alike = || channels.iter().filter(|(_, channel)| channel.key == **key);
         let dots = Style::new(Colour::Black).width(2.4);
-        let measured = alike().next().and_then(|channel| of(channel, "measured"));
-        let curves = alike().filter_map(|channel| {
+        let measured = alike()
+            .next()
+            .and_then(|(_, channel)| of(channel, "measured"));
+        let curves = alike().filter_map(|(i, channel)| {
             let [t, y] = of(channel, "predicted")?;
-            let name = &runs[channel.run].name;
-            Some(Mark::line(name, &t, &y, style(channel.run).width(1.2)))
+            let name = &runs[*i].name;
+            Some(Mark::line(name, &t, &y, style(*i).width(1.2)))
         });
         Panel::of_time(kind, unit)
             .title(record)
@@ -135,7 +134,7 @@ fn panels(runs: &[ComparedRun], channels: &[Channel]) -> Vec<Panel> {
 
 /// Samples of the validation records with the prediction of each run.
 fn validation(runs: &[ComparedRun]) -> Option<Figure> {
-    let panels = panels(runs, &channels(runs));
+    let panels = panels(runs);
     let figure = Figure::new(
         "validation",
         "Validation records",

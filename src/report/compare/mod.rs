@@ -16,6 +16,7 @@ use super::run_reader::Run;
 use super::text::{aligned, clean};
 use crate::error::InputError;
 use crate::number_format::significant;
+use crate::results::read_lock;
 use measures::HEADINGS;
 use serde::Serialize;
 use std::fmt::Write;
@@ -39,6 +40,8 @@ pub struct ComparedRun {
     pub finished: Run,
     /// Digests of the files of its records, windows and bands, channels with their numbers of samples.
     records: Vec<String>,
+    /// The channels of its validation records.
+    validation: Vec<figures::Channel>,
 }
 
 impl ComparedRun {
@@ -47,6 +50,8 @@ impl ComparedRun {
     /// # Errors
     /// If there is no complete run in the folder.
     pub fn read(name: &str, folder: &Path) -> Result<Self, InputError> {
+        // All that is read belongs to one run.
+        let _lock = read_lock(folder);
         let finished = Run::open(folder)?;
         let model = finished.own_model()?;
         let names = model.record_names();
@@ -60,6 +65,7 @@ impl ComparedRun {
         Ok(Self {
             name: name.into(),
             records: files.chain(used).chain(channels).collect(),
+            validation: figures::channels(&finished),
             finished,
         })
     }
