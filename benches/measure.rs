@@ -17,7 +17,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::study::multistart::multistart;
-use kmcfit_core::{Ends, Law, Method, Motion, StageSamples, Structure, Trajectory};
+use kmcfit_core::{Ends, Excitation, Law, Method, Motion, StageSamples, Structure, Trajectory};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -179,15 +179,16 @@ fn chain_of_masses(n: usize, nodes: usize) {
     let values: Vec<Vec<f64>> = (0..3 * n).map(|f| vec![level(f); nodes]).collect();
     let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
     let force: Vec<f64> = (0..nodes).map(|i| (0.07 * i as f64).sin()).collect();
-    let force = StageSamples::linear(&force);
+    let excitation = Excitation {
+        forces: vec![(n - 1, StageSamples::linear(&force))],
+        ..Excitation::default()
+    };
     let motion = Motion {
         structure: &structure,
         method: Method::ImplicitMidpoint,
         step: 0.02,
         functions: &functions,
-        forces: &[(n - 1, &force)],
-        frames: &[],
-        supports: &[],
+        excitation: Some(&excitation),
     };
     let initial = vec![0.0; 2 * n];
     let mut states = Trajectory::zeros(n, nodes);

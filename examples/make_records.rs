@@ -64,10 +64,7 @@ impl Run<'_> {
             };
             StageSamples::new((0..nodes - 1).map(step))
         };
-        let excitation = Excitation {
-            force: self.force.map(steps),
-            base: self.base.map(steps),
-        };
+        let excitation = Excitation::one(self.force.map(steps), self.base.map(steps));
         let response: Trajectory = system
             .forward(&nodal, &self.initial, Some(&excitation))
             .expect("a motion");

@@ -445,9 +445,9 @@ fn svg(figure: &Figure) -> (String, String) {
 }
 
 fn driven_by(excitation: Option<&Excitation>) -> Vec<String> {
-    let parts = excitation.map(|e| [("force", &e.force), ("base", &e.base)]);
+    let parts = excitation.map(|e| [("force", e.force(0)), ("base", e.frame(0))]);
     let acting = parts.into_iter().flatten();
-    let acting = acting.filter(|(_, part)| part.as_ref().is_some_and(|part| !part.is_zero()));
+    let acting = acting.filter(|(_, part)| part.is_some_and(|part| !part.is_zero()));
     acting.map(|(name, _)| name.to_owned()).collect()
 }
 

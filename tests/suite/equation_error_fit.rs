@@ -143,10 +143,7 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
         inertias: vec![vec![1.0; NODES]],
         coefficients: vec![vec![0.005 * 2.0 * base.sqrt(); NODES], k.clone()],
     };
-    let excitation = Excitation {
-        force: Some(random_function(&system.grid, seed)),
-        base: None,
-    };
+    let excitation = Excitation::one(Some(random_function(&system.grid, seed)), None);
     let channel = sample_table(&system, &device, &excitation, ChannelKind::Acceleration);
     let experiment = Experiment::free("shaken", State::one(0.0, 0.0), NODES).with_channel(channel);
     (problem_of(system, list, experiment), k)
@@ -217,10 +214,7 @@ fn driven(kind: ChannelKind, excitation: Excitation, mass: Option<f64>) -> Probl
 fn constants_under_a_known_force() {
     for kind in [ChannelKind::Acceleration, ChannelKind::Displacement] {
         for seed in 1..=3 {
-            let excitation = Excitation {
-                force: Some(random_function(&system().grid, seed)),
-                base: None,
-            };
+            let excitation = Excitation::one(Some(random_function(&system().grid, seed)), None);
             let found = run(&driven(kind, excitation, None));
             let within = match kind {
                 // Smoothing by a noise level that a noise-free record does not have.
@@ -237,10 +231,7 @@ fn constants_under_a_known_force() {
 #[test]
 fn constants_on_a_known_base() {
     for mass in [Some(2.0), None] {
-        let excitation = Excitation {
-            force: None,
-            base: Some(random_function(&system().grid, 4)),
-        };
+        let excitation = Excitation::one(None, Some(random_function(&system().grid, 4)));
         let found = run(&driven(ChannelKind::Acceleration, excitation, mass));
         let expected: &[f64] = match mass {
             Some(_) => &[1.5, 300.0],
@@ -380,10 +371,7 @@ fn left_out(problem: &Problem) -> [usize; 2] {
 /// one sample.
 #[test]
 fn two_periods_are_left_out_beside_a_known_force() {
-    let excitation = Excitation {
-        force: Some(random_function(&system().grid, 1)),
-        base: None,
-    };
+    let excitation = Excitation::one(Some(random_function(&system().grid, 1)), None);
     let mut problem = driven(ChannelKind::Acceleration, excitation, None);
     let period = TAU / (300.0_f64 / 2.0).sqrt();
     let expected = 2.0 * period / problem.system.grid.step();

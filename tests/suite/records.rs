@@ -44,10 +44,7 @@ fn motion(
         };
         StageSamples::new((0..nodes - 1).map(step))
     };
-    let excitation = Excitation {
-        force: Some(steps(force)),
-        base: Some(steps(base)),
-    };
+    let excitation = Excitation::one(Some(steps(force)), Some(steps(base)));
     let initial = State::one(0.02, 0.0);
     let motion = system
         .forward(&device, &initial, Some(&excitation))

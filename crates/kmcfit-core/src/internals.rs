@@ -103,7 +103,7 @@ pub mod solvers {
     };
 }
 pub mod structure {
-    pub use crate::structure::{Law, Structure};
+    pub use crate::structure::{Ends, Law, Structure};
 }
 pub mod study {
     pub use crate::study::{
@@ -115,7 +115,7 @@ pub mod study {
 pub mod system {
     pub use crate::system::{
         Excitation, Grid, InputQuantity, InputSample, Method, NodalCoefficients, StageSamples,
-        State, System, SystemTangent, TimePoint, quadrature, round_time,
+        State, SupportMotion, System, SystemTangent, TimePoint, quadrature, round_time,
     };
 }
 pub mod threads {

@@ -95,11 +95,12 @@ pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, InputErrorKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
 pub use system::{
-    Excitation, Grid, InputQuantity, Method, NodalCoefficients, StageSamples, State, System,
+    Excitation, Grid, InputQuantity, Method, NodalCoefficients, StageSamples, State, SupportMotion,
+    System,
 };
 // Simulation and cost.
 pub use objective::{Evaluation, Gradient, GradientKind};
-pub use step::{Cause, Motion, MotionError, SimulationError, SupportMotion, Trajectory};
+pub use step::{Cause, Motion, MotionError, SimulationError, Trajectory};
 pub use structure::{Ends, Law, Structure, StructureError};
 // Fits.
 pub use solvers::{

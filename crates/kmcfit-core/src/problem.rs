@@ -65,13 +65,15 @@ pub enum ProblemError {
         /// Nodes of the grid.
         grid: usize,
     },
-    /// A coefficient set does not have one function for the mass and one for each term.
-    #[error("a mass and {terms} terms need one function each; found {found}")]
+    /// A coefficient set does not have one function for each inertia and one for each element.
+    #[error("{inertias} inertias and {elements} elements need one function each; found {found}")]
     Functions {
         /// Number of functions.
         found: usize,
-        /// Number of terms.
-        terms: usize,
+        /// Number of inertias.
+        inertias: usize,
+        /// Number of elements.
+        elements: usize,
     },
     /// A record does not fit the grid or the functions.
     #[error("record `{name}`: {reason}")]
@@ -112,15 +114,16 @@ impl ProblemParts {
         if functions != grid {
             return Err(ProblemError::Nodes { functions, grid });
         }
-        let terms = self.system.laws().len();
-        for found in self
-            .functions
-            .coefficient_sets()
-            .iter()
-            .map(|set| set.len())
-        {
-            if found != 1 + terms {
-                return Err(ProblemError::Functions { found, terms });
+        let structure = &self.system.structure;
+        let (inertias, elements) = (structure.inertias().len(), structure.laws().len());
+        for set in self.functions.coefficient_sets() {
+            let found = set.len();
+            if (set.inertias(), found) != (inertias, inertias + elements) {
+                return Err(ProblemError::Functions {
+                    found,
+                    inertias,
+                    elements,
+                });
             }
         }
         for experiment in &self.experiments {
@@ -169,7 +172,20 @@ impl ProblemParts {
             .flatten();
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
+        let structure = &self.system.structure;
+        let components = 2 * structure.coordinates();
+        let has_state = [
+            record.initial.components().len(),
+            record.initial_parameters.len(),
+        ] == [components; 2];
         match () {
+            () if !has_state => Some("an initial state of another number of coordinates"),
+            () if excitation.map_or(structure.supports() > 0, |e| !e.acts_on(structure)) => {
+                Some("forces, frames or supports of another structure")
+            }
+            () if record.channels.iter().any(|c| !c.observes(structure)) => {
+                Some("a sensor on a coordinate that is not there")
+            }
             () if !(2..=self.system.grid.nodes()).contains(&record.nodes) => {
                 Some("fewer than two nodes, or more than the grid has")
             }

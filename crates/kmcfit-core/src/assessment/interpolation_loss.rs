@@ -61,11 +61,7 @@ fn with_cubics(problem: &Problem, e: usize) -> Option<(InputQuantity, Signal)> {
         }
         (None, Some(error)) if error.interpolation == Interpolation::Linear => {
             let excitation = experiment.excitation.as_ref()?;
-            let part = match error.quantity {
-                InputQuantity::Force => &excitation.force,
-                InputQuantity::BaseAcceleration => &excitation.base,
-            };
-            let at_nodes = part.as_ref()?.at_nodes();
+            let at_nodes = excitation.quantity(error.quantity)?.at_nodes();
             let grid = &problem.system.grid;
             let last = at_nodes.len().checked_sub(2)?;
             let at = |t: &f64| {

@@ -124,7 +124,9 @@ impl FitAssessment {
         let best = &fit.best;
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
         let reports_errors = few && problem.sample_count() > problem.parameters();
-        let has_causes = reports_errors && fit.outcome.status != Status::Failed;
+        // Causes and classical estimates are those of one coordinate.
+        let is_one = problem.system.structure.is_one();
+        let has_causes = reports_errors && is_one && fit.outcome.status != Status::Failed;
         let plausibility = || {
             let halved = problem.on_half_step(&best.evaluation);
             let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
@@ -184,7 +186,10 @@ impl FitAssessment {
             );
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             let is_white = !is_coloured && !assessment.plausibility.is_disturbed;
-            let losses = interpolation_losses(problem, theta, evaluation, is_white);
+            let losses = match is_one {
+                true => interpolation_losses(problem, theta, evaluation, is_white),
+                false => Vec::new(),
+            };
             if !losses.is_empty() {
                 // What interpolation takes of a force leaves residuals like those of a missing term.
                 let warnings = &mut assessment.plausibility.warnings;
@@ -207,7 +212,8 @@ impl FitAssessment {
             }
             let effective = assessment.effective_parameters.as_deref();
             let covariance = bands.covariance.as_ref().filter(|_| tests_bases);
-            let rival = amplitude_rival(problem, theta, evaluation, covariance, effective);
+            let rival = || amplitude_rival(problem, theta, evaluation, covariance, effective);
+            let rival = is_one.then(rival).flatten();
             if let Some(rival) = rival {
                 condition_on_time(problem, &mut assessment.classifications, &rival.indices);
                 (assessment.plausibility.warnings).push(FitWarning::TimeOrAmplitude(rival));
@@ -227,7 +233,7 @@ impl FitAssessment {
             assessment.large_covariance =
                 LargeCovariance::of(problem, &best.parameters, &best.evaluation);
         }
-        if fit.outcome.status != Status::Failed {
+        if is_one && fit.outcome.status != Status::Failed {
             let (bands, effective) = (
                 assessment.bands.as_ref(),
                 assessment.effective_parameters.as_deref(),

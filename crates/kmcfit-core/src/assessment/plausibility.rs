@@ -423,10 +423,9 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     }
     let step = problem.system.grid.step();
     for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
-        let force = experiment
-            .excitation
-            .as_ref()
-            .and_then(|e| e.force.as_ref());
+        let excitation = experiment.excitation.as_ref();
+        let force = excitation.and_then(|e| e.force(0));
+        let force = force.filter(|_| problem.system.structure.is_one());
         let Some(force) = force.filter(|force| !force.is_zero()) else {
             continue;
         };

@@ -208,7 +208,7 @@ impl<'a> Samples<'a> {
         let input = excitation.map(|excitation| {
             let at = |i: usize| {
                 let sample = channel.input_at_sample(Some(excitation), i);
-                if excitation.base.is_some() {
+                if excitation.frame(0).is_some() {
                     sample.base
                 } else {
                     sample.force

@@ -43,7 +43,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
             .expected("a number for one of them, or a `prior`"));
     }
     let mut forced = problem.experiments.iter().filter(|e| !e.is_free());
-    let by_force = |e: &Experiment| e.excitation.as_ref().is_some_and(|x| x.base.is_none());
+    let by_force = |e: &Experiment| e.excitation.as_ref().is_some_and(|x| x.frames.is_empty());
     let all = forced.clone().count() > 0 && forced.all(|e| by_force(e) && open_scale(e));
     match all && scale_is_open(problem) {
         true => Err(BuildError::new(

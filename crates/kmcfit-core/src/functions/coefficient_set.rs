@@ -2,18 +2,32 @@
 
 use std::ops::Deref;
 
-/// One function for the mass and one for each force term, as indices into the list of functions, mass first. It dereferences to
+/// One function for each inertia and one for each element, as indices into the list of functions, inertias first. It dereferences to
 /// these indices.
 ///
 /// A coefficient is its function plus its known parts: `m = m_0 + sum_i m_i`.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CoefficientSet {
     functions: Vec<usize>,
+    /// Number of inertias among them.
+    inertias: usize,
     /// Place of the coefficient (mass 0) and index of each known part.
     known_parts: Vec<(usize, usize)>,
 }
 
 impl CoefficientSet {
+    /// The set with this number of inertias, which are its first functions; one unless stated.
+    #[must_use]
+    pub fn with_inertias(mut self, inertias: usize) -> Self {
+        self.inertias = inertias;
+        self
+    }
+
+    /// Number of inertias.
+    pub fn inertias(&self) -> usize {
+        self.inertias
+    }
+
     /// The set with `known_parts`, each with the place of its coefficient (mass 0) and the index of its function.
     #[must_use]
     pub fn with_known_parts(mut self, known_parts: Vec<(usize, usize)>) -> Self {
@@ -37,6 +51,7 @@ impl From<Vec<usize>> for CoefficientSet {
     fn from(functions: Vec<usize>) -> Self {
         Self {
             functions,
+            inertias: 1,
             known_parts: Vec::new(),
         }
     }

@@ -268,7 +268,8 @@ impl Parameterization {
 
     /// Nodal coefficients of the right shape, all zero.
     pub fn empty_nodal(&self) -> NodalCoefficients {
-        NodalCoefficients::zeros(self.nodes, self.coefficient_sets[0].len() - 1)
+        let set = &self.coefficient_sets[0];
+        NodalCoefficients::zeros(self.nodes, set.inertias(), set.len() - set.inertias())
     }
 
     /// Nodal values of the shared coefficient set at the parameters `theta`.

@@ -114,5 +114,5 @@ pub(super) fn given_words(names: &[String]) -> String {
 
 /// The force of an experiment, where there is one.
 pub(super) fn force_of(experiment: &Experiment) -> Option<&StageSamples> {
-    experiment.excitation.as_ref()?.force.as_ref()
+    experiment.excitation.as_ref()?.force(0)
 }

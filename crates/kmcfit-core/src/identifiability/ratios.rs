@@ -14,8 +14,12 @@ pub struct RatioOfSet {
     pub ratio: Ratio,
 }
 
-/// `k/m`, `c/m`, natural frequency and damping ratio of the shared coefficient set, as far as the system has these terms.
+/// `k/m`, `c/m`, natural frequency and damping ratio of the shared coefficient set, as far as the system has these terms; none of a structure of
+/// several coordinates.
 pub fn ratios_of_set(problem: &Problem) -> Vec<RatioOfSet> {
+    if !problem.system.structure.is_one() {
+        return Vec::new();
+    }
     let set = problem.functions.coefficient_set(0);
     let terms = problem.system.laws();
     // The functions of a coefficient: its own and its known parts.

@@ -6,18 +6,20 @@ mod jacobian;
 mod node_aligned;
 mod prediction;
 mod residual_diagnostics;
+mod row_prediction;
 mod scales;
 mod simulated_record;
 mod step_halving;
 
 pub use gradient::{Gradient, GradientKind};
 pub use residual_diagnostics::{all_diagnostics, channel_fit_percent, diagnostics, outliers};
+pub(crate) use row_prediction::RowSamples;
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
 pub use step_halving::Refined;
 
 use crate::problem::Problem;
-use crate::record::Channel;
+use crate::record::{Channel, Experiment};
 use crate::step::{Cause, Driven, EngineMode, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 
@@ -57,6 +59,7 @@ impl Problem {
     /// Storage for evaluations by [`Problem::evaluate_into`].
     pub fn workspace(&self) -> Evaluation {
         let nodal_sets = self.functions.coefficient_sets().len();
+        let coordinates = self.system.structure.coordinates();
         Evaluation {
             cost: f64::NAN,
             misfit: f64::NAN,
@@ -65,7 +68,7 @@ impl Problem {
             own_nodal: vec![self.functions.empty_nodal(); nodal_sets - 1],
             scalars: vec![0.0; self.functions.scalars().len()],
             trajectories: (self.experiments.iter())
-                .map(|e| Trajectory::zeros(1, e.nodes))
+                .map(|e| Trajectory::zeros(coordinates, e.nodes))
                 .collect(),
             predictions: (self.experiments.iter())
                 .map(|e| vec![Vec::new(); e.channels.len()])
@@ -197,12 +200,7 @@ impl Problem {
         let scalars = self.scalars(along);
         let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
             let view = self.view(evaluation, e);
-            let initial = experiment.initial_parameters.iter();
-            let initial = initial.map(|estimated| estimated.map_or(0.0, |i| scalars[i]));
-            let direction = SystemTangent {
-                nodal: self.functions.direction(along, experiment.coefficient_set),
-                initial: State::from(initial.collect::<Vec<f64>>()),
-            };
+            let direction = self.system_tangent(experiment, along);
             let response = view.driven().tangent(view.response, &direction);
             let along = RecordTangent {
                 nodal: &direction.nodal,
@@ -213,6 +211,17 @@ impl Problem {
             channels.map(|c| c.predict_tangent(view, along)).collect()
         });
         each.collect()
+    }
+
+    /// Change of the functions and the initial state of an experiment along a change of the parameters.
+    fn system_tangent(&self, experiment: &Experiment, along: &[f64]) -> SystemTangent {
+        let scalars = self.scalars(along);
+        let initial = experiment.initial_parameters.iter();
+        let initial = initial.map(|estimated| estimated.map_or(0.0, |i| scalars[i]));
+        SystemTangent {
+            nodal: self.functions.direction(along, experiment.coefficient_set),
+            initial: State::from(initial.collect::<Vec<f64>>()),
+        }
     }
 
     /// Error with the location of the largest residual, for a cost that is not finite.

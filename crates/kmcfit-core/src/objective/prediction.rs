@@ -1,6 +1,7 @@
 //! Predicted samples of a channel, their tangent and its transpose.
 
 use super::node_aligned::{AddTranspose, Predict};
+use super::row_prediction::RowSamples;
 use super::{RecordTangent, SimulatedRecord};
 use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
@@ -87,19 +88,23 @@ impl Channel {
         (input, base)
     }
 
-    /// Time derivative of [`Channel::sensed`] at sample `i`, in its unit per s; zero outside the response.
+    /// Time derivative of sample `i` before gain, offset and drift, in its unit per s; zero outside the response.
     ///
     /// Central difference of the interpolation within the step, a polynomial for displacement and velocity: its error is of the order
     /// `FRACTION^2` of the third derivative.
-    fn sensed_rate(&self, view: SimulatedRecord, i: usize) -> f64 {
+    fn sensed_rate(
+        &self,
+        view: SimulatedRecord,
+        i: usize,
+        mut value_at: impl FnMut(TimePoint) -> f64,
+    ) -> f64 {
         let (place, inside) = self.delayed_place(view, i);
         if !inside {
             return 0.0;
         }
-        let at = |by: f64| {
+        let mut at = |by: f64| {
             let fraction = place.fraction + by;
-            let moved = TimePoint { fraction, ..place };
-            self.value_at(view, i, moved)
+            value_at(TimePoint { fraction, ..place })
         };
         (at(FRACTION) - at(-FRACTION)) / (2.0 * FRACTION * view.system.grid.step())
     }
@@ -112,10 +117,21 @@ impl Channel {
         i: usize,
         value: f64,
     ) -> [f64; Sensor::PARAMETERS] {
+        self.factors(view, i, value, |place| self.value_at(view, i, place))
+    }
+
+    /// [`Channel::sensor_factors`] with the value of sample `i` at any place.
+    pub(super) fn factors(
+        &self,
+        view: SimulatedRecord,
+        i: usize,
+        value: f64,
+        value_at: impl FnMut(TimePoint) -> f64,
+    ) -> [f64; Sensor::PARAMETERS] {
         let [gain, ..] = self.sensor().values(view.scalars);
         let [.., delay, input_delay] = self.sensor().indices();
         let rate = match delay.or(input_delay) {
-            Some(_) => gain * self.sensed_rate(view, i),
+            Some(_) => gain * self.sensed_rate(view, i, value_at),
             None => 0.0,
         };
         [value, 1.0, self.age(i), -rate, rate]
@@ -133,6 +149,12 @@ impl Channel {
         }
     }
 
+    /// The coordinate whose displacements at all nodes the predicted samples are, if they are.
+    fn displacement_of_nodes(&self) -> Option<usize> {
+        let is_plain = self.is_on_every_node() && self.is_plain();
+        is_plain.then(|| self.coordinate()).flatten()
+    }
+
     /// Predicted samples.
     pub fn predict(&self, view: SimulatedRecord) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.len());
@@ -143,11 +165,13 @@ impl Channel {
     /// [`Channel::predict`] into existing storage.
     pub fn predict_into(&self, view: SimulatedRecord, out: &mut Vec<f64>) {
         out.clear();
-        if self.is_on_every_node() && self.is_plain() {
-            out.extend_from_slice(&view.response.displacement(0)[..self.len()]);
+        if let Some(j) = self.displacement_of_nodes() {
+            out.extend_from_slice(&view.response.displacement(j)[..self.len()]);
             return;
         }
-        if self.is_acceleration_on_nodes() {
+        if !view.system.structure.is_one() {
+            RowSamples::new(self, view).predict_into(out);
+        } else if self.is_acceleration_on_nodes() {
             let channel = self;
             out.reserve_exact(self.len());
             simd::run(Predict { channel, view, out });
@@ -166,6 +190,9 @@ impl Channel {
 
     /// Directional derivative of [`Channel::predict`].
     pub fn predict_tangent(&self, view: SimulatedRecord, along: RecordTangent) -> Vec<f64> {
+        if !view.system.structure.is_one() {
+            return self.row_tangents(view, &[along]).remove(0);
+        }
         let [gain, ..] = self.sensor().values(view.scalars);
         let model = |i: usize| {
             let sensed = self.sensed(view, i);
@@ -198,10 +225,13 @@ impl Channel {
                 &filtered
             }
         };
-        if self.is_on_every_node() && self.is_plain() {
-            let pairs = source.component_mut(0).iter_mut().zip(slopes);
+        if let Some(j) = self.displacement_of_nodes() {
+            let pairs = source.component_mut(j).iter_mut().zip(slopes);
             pairs.for_each(|(source, slope)| *source += slope);
             return;
+        }
+        if !view.system.structure.is_one() {
+            return RowSamples::new(self, view).add_transpose(slopes, source, direct, scalars);
         }
         if self.is_acceleration_on_nodes() {
             return simd::run(AddTranspose {

@@ -8,13 +8,13 @@ use crate::signal::Spectrum;
 use crate::simd::LANES;
 use crate::simd::sum::largest;
 use crate::step::Trajectory;
-use crate::structure::Law;
+use crate::structure::{Ends, Law, Structure};
 use crate::system::quadrature::curvature_at;
 use std::f64::consts::TAU;
 
 impl Problem {
     /// Natural scale of each function of the list: the larger of its largest value and of the value whose force equals the
-    /// inertia force, `max m * rms(y'') / rms(phi)`. The mean squares are over the responses of the measured experiments of the
+    /// inertia force, `max m * rms(y'') / rms(phi)`, with the root of the sum of squares over all inertias. The mean squares are over the responses of the measured experiments of the
     /// coefficient set (of all experiments if none has samples). A damping close to zero thus has the scale of a relevant
     /// damping.
     pub fn natural_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
@@ -28,16 +28,16 @@ impl Problem {
     }
 
     fn sizes(&self, evaluation: &Evaluation, size_of: fn(&[f64]) -> f64) -> Vec<f64> {
-        let terms = self.system.laws();
+        let structure = &self.system.structure;
         let step = self.system.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
-            .map(|response| squares(response, terms, step))
+            .map(|response| squares(response, structure, step))
             .collect();
         let any_has_samples = self.experiments.iter().any(Experiment::has_samples);
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.coefficient_sets().iter().enumerate() {
             let nodal = evaluation.nodal_of(which);
-            // Index 0: sum of squares of the acceleration; index `j + 1`: of `phi` of term `j`, then of `phi` of each term.
+            // Sums of squares of the accelerations of inertias, then of `phi` of elements.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
                 let own = own.filter(|(e, _)| {
@@ -45,13 +45,14 @@ impl Problem {
                 });
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
-            let mass = size_of(&nodal.inertias[0]);
-            let inertia = mass * root(0);
-            let natural = |j: usize| match root(j + 1) {
+            let masses: Vec<f64> = nodal.inertias.iter().map(|m| size_of(m)).collect();
+            let forces = masses.iter().enumerate().map(|(r, m)| m * root(r));
+            let inertia = forces.fold(0.0f64, f64::hypot);
+            let natural = |e: usize| match root(masses.len() + e) {
                 response if response > 0.0 => inertia / response,
                 _ => 0.0,
             };
-            let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
+            let natural = (masses.iter().copied()).chain((0..structure.laws().len()).map(natural));
             let own = nodal.functions().map(size_of);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
@@ -90,8 +91,12 @@ impl Problem {
     }
 }
 
-/// Sums over the nodes of `y''^2` and of `phi^2` of each term.
-fn squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
+/// Sums over the nodes of the squares of the accelerations of inertias, and of `phi` of each element.
+fn squares(response: &Trajectory, structure: &Structure, step: f64) -> Vec<f64> {
+    if !structure.is_one() {
+        return squares_of_structure(response, structure, step);
+    }
+    let terms = structure.laws();
     let (y, v) = (response.displacement(0), response.velocity(0));
     let nodes = y.len();
     if nodes <= LONG_RECORD_STEPS {
@@ -105,6 +110,28 @@ fn squares(response: &Trajectory, terms: &[Law], step: f64) -> Vec<f64> {
     };
     let terms = terms.iter().map(of);
     std::iter::once(inertia).chain(terms).collect()
+}
+
+/// [`squares`] of any number of coordinates; supports at rest.
+fn squares_of_structure(response: &Trajectory, structure: &Structure, step: f64) -> Vec<f64> {
+    let n = structure.coordinates();
+    let across = |ends: &Ends, of: &dyn Fn(usize) -> f64| {
+        let entries = ends.entries().iter().filter(|(j, _)| *j < n);
+        entries.map(|(j, factor)| factor * of(*j)).sum::<f64>()
+    };
+    let inertia = |ends: &Ends| {
+        sum_of_squares(response.nodes(), |i| {
+            across(ends, &|j| curvature_at(response.displacement(j), step, i))
+        })
+    };
+    let element = |(law, ends): (Law, &Ends)| {
+        sum_of_squares(response.nodes(), |i| {
+            let x = across(ends, &|j| response.displacement(j)[i]);
+            law.phi(x, across(ends, &|j| response.velocity(j)[i]))
+        })
+    };
+    let inertias = structure.inertias().iter().map(inertia);
+    inertias.chain(structure.elements().map(element)).collect()
 }
 
 /// [`squares`] of a short record. Steepest descent depends on every bit, so sums are sequential; four columns are

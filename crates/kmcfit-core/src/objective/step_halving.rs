@@ -3,7 +3,7 @@
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::step::{Driven, EngineMode, SimulationError, Trajectory};
-use crate::system::{Grid, NodalCoefficients, State, System};
+use crate::system::{Grid, NodalCoefficients, System};
 use std::ops::Range;
 
 /// Number of steps of a block: its states and functions on half the step take some ten MB.
@@ -100,7 +100,7 @@ impl Problem {
             };
             let nodal = halved(nodal, steps);
             let excitation = part.excitation.as_ref();
-            let mut response = Trajectory::zeros(1, part.nodes);
+            let mut response = Trajectory::zeros(state.coordinates(), part.nodes);
             let driven = Driven {
                 system: &system,
                 nodal: &nodal,
@@ -123,10 +123,7 @@ impl Problem {
             for (channel, predicted) in channels.filter(|(channel, _)| !channel.is_empty()) {
                 predicted.extend(channel.predict(view));
             }
-            state = State::one(
-                response.displacement(0)[part.nodes - 1],
-                response.velocity(0)[part.nodes - 1],
-            );
+            response.read(part.nodes - 1, state.components_mut());
             first = end;
         }
         Ok(Some(predictions))
@@ -141,7 +138,7 @@ fn halved(nodal: &NodalCoefficients, steps: Range<usize>) -> NodalCoefficients {
         pairs.chain(f.last().copied()).collect()
     };
     NodalCoefficients {
-        inertias: vec![finer(&nodal.inertias[0])],
+        inertias: nodal.inertias.iter().map(|f| finer(f)).collect(),
         coefficients: nodal.coefficients.iter().map(|f| finer(f)).collect(),
     }
 }
@@ -157,6 +154,7 @@ mod tests {
     use crate::structure::{Law, Structure};
     use crate::system::InputSample;
     use crate::system::Method;
+    use crate::system::State;
 
     const NODES: usize = 101;
 

@@ -3,18 +3,21 @@
 use super::sample_places::SamplePlaces;
 use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
+use crate::structure::{Ends, Structure};
 use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
 use std::ops::Range;
 use std::sync::Arc;
 
 /// The samples of one sensor.
 ///
-/// The model of sample `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`. Here `h_i` is displacement, velocity or
-/// acceleration of the response ([`observe`](crate::step::observe())) at `t_i - delay`, `b_i` the same of the base for a
-/// sensor of absolute motion, and `t_0` the time of the first sample. A filter, if any, is applied to model and samples.
+/// The model of sample `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`. Here `h_i` is a combination of displacements,
+/// velocities or accelerations of the response ([`observe`](crate::step::observe())) at `t_i - delay`, `b_i` the same of the base for
+/// a sensor of absolute motion, and `t_0` the time of the first sample. A filter, if any, is applied to model and samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     kind: ChannelKind,
+    /// Combination of coordinates that is observed.
+    row: Ends,
     // Shared by copies: problems are copied often.
     times: Arc<Vec<f64>>,
     /// Time from which a drift counts, s.
@@ -65,6 +68,7 @@ impl Channel {
         let places = SamplePlaces::of(&times, grid, nodes)?;
         fits.then(|| Self {
             kind,
+            row: Ends::ground(0),
             places,
             origin: times[0],
             times,
@@ -98,6 +102,33 @@ impl Channel {
         let channel = channel.expect("samples on the nodes of the grid");
         assert!(stride > 0, "samples advance");
         channel
+    }
+
+    /// Sets the combination of coordinates and supports that is observed; the first coordinate unless set.
+    #[must_use]
+    pub fn observing(mut self, row: Ends) -> Self {
+        self.row = row;
+        self
+    }
+
+    /// The combination of coordinates and supports that is observed.
+    pub fn row(&self) -> &Ends {
+        &self.row
+    }
+
+    /// The coordinate that is observed, where it is a single one.
+    pub(crate) fn coordinate(&self) -> Option<usize> {
+        match self.row.entries() {
+            [(j, 1.0)] => Some(*j),
+            _ => None,
+        }
+    }
+
+    /// True if its row has only coordinates and supports of a structure.
+    pub(crate) fn observes(&self, structure: &Structure) -> bool {
+        let count = structure.coordinates() + structure.supports();
+        let mut entries = self.row.entries().iter();
+        entries.all(|(j, _)| *j < count)
     }
 
     /// Sets the loss; a robust loss needs samples with a sigma.
@@ -257,6 +288,7 @@ impl Channel {
             noise_model: self.noise_model,
             noise,
             kind: self.kind,
+            row: self.row.clone(),
             times: Arc::new(short(&self.times)),
             origin: self.origin,
             places: self.places.first(count),
@@ -403,9 +435,10 @@ impl Channel {
         self.times[i] - self.origin
     }
 
-    /// True for displacements of an ideal sensor without a filter.
+    /// True for displacements of one coordinate by an ideal sensor without a filter.
     pub(crate) fn is_plain(&self) -> bool {
         self.kind == ChannelKind::Displacement
+            && self.coordinate().is_some()
             && self.sensor == Sensor::default()
             && self.base.is_empty()
             && self.filter.is_empty()

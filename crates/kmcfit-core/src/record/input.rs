@@ -55,18 +55,18 @@ impl Input {
             };
             StageSamples::new((0..nodes - 1).map(step))
         };
-        Excitation {
-            force: self.force.as_ref().map(|force| match force {
+        Excitation::one(
+            self.force.as_ref().map(|force| match force {
                 Waveform::Samples(s) => interpolated(s),
                 Waveform::Shape(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
             }),
-            base: self.base.as_ref().map(|base| match base {
+            self.base.as_ref().map(|base| match base {
                 BaseMotion::Acceleration(s) => interpolated(s),
                 BaseMotion::Displacement(s) => {
                     sample(&|t| s.second_derivative(t), &|t| s.second_derivative(t))
                 }
             }),
-        }
+        )
     }
 
     /// Shares `times` (s) with the signals that have the same.

@@ -17,7 +17,7 @@ use super::observer::Observer;
 use super::rounds::{counted, is_ended, with_round};
 use super::settings::FitSettings;
 use crate::noise::{Correlation, CorrelationLaw, InputErrors, InputRow, InputStep};
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, RowSamples};
 use crate::problem::Problem;
 use crate::record::{
     Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
@@ -25,7 +25,7 @@ use crate::record::{
 use crate::scalar_search::root;
 use crate::step::SimulationError;
 use crate::system::{Grid, InputQuantity};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Largest number of rounds of fit and estimation.
@@ -150,34 +150,29 @@ pub(crate) fn input_error_effect(
     let derivatives = (view.driven()).input_derivatives(view.response, error.quantity);
     let steps: Vec<InputStep> = derivatives
         .into_iter()
-        .map(|[state, input]| InputStep {
-            state: DMatrix::from_fn(2, 2, |end, start| state[start][end]),
-            input: input.map(|by| DVector::from_row_slice(&by)),
-        })
+        .map(|(state, input)| InputStep { state, input })
         .collect();
     let [gain, ..] = channel.sensor().values(view.scalars);
     let grid = &problem.system.grid;
     let is_acceleration = channel.kind() == ChannelKind::Acceleration;
+    let mut of_rows = RowSamples::new(channel, view);
+    let acting = view
+        .excitation
+        .map_or(vec![0], |e| e.acting(error.quantity));
     let rows: Vec<InputRow> = (0..channel.len())
         .map(|j| {
             let place = channel.place(view, j);
-            let (i, x) = (place.step, place.fraction);
-            let by_input = match error.quantity {
-                _ if !is_acceleration => 0.0,
-                InputQuantity::Force => {
-                    let mass = &view.nodal.inertias[0];
-                    1.0 / (mass[i] * (1.0 - x) + mass[i + 1] * x)
-                }
-                // The sensor of absolute motion adds the acceleration of the base that the relative one loses.
-                InputQuantity::BaseAcceleration if channel.base().is_empty() => -1.0,
-                InputQuantity::BaseAcceleration => 0.0,
+            let by_input = match is_acceleration {
+                true => of_rows.by_input(j, error.quantity, &acting),
+                false => 0.0,
             };
-            let [y, v, next_y, next_v] = channel.sensed(view, j).states.map(|a| gain * a);
+            let states = of_rows.observe(j).states.each_ref();
+            let states = states.map(|by| gain * DVector::from_column_slice(by));
             InputRow {
-                step: i,
-                states: [[y, v], [next_y, next_v]].map(|by| DVector::from_row_slice(&by)),
+                step: place.step,
+                states,
                 input: gain * by_input,
-                place: error.place(grid.time(i) + x * grid.step()),
+                place: error.place(grid.time(place.step) + place.fraction * grid.step()),
             }
         })
         .collect();

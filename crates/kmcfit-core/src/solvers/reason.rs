@@ -181,6 +181,9 @@ pub enum MissingMeasurement {
     /// A nonzero response.
     #[error("all samples are zero")]
     Motion,
+    /// One coordinate.
+    #[error("the equation error is that of one coordinate: use `method: gauss-newton`")]
+    OneCoordinate,
 }
 
 fn iterations(count: u64) -> String {

@@ -101,9 +101,8 @@ impl Problem {
     /// `moved`, or where its mass is not positive the nearest point to `start` with positive mass, if one is feasible.
     fn with_mass(&self, start: &[f64], metric: &[f64], moved: Vec<f64>) -> Vec<f64> {
         let positive = |theta: &[f64]| {
-            self.functions.nodal(theta).inertias[0]
-                .iter()
-                .all(|m| *m > 0.0)
+            let masses = self.functions.nodal(theta).inertias;
+            masses.iter().flatten().all(|m| *m > 0.0)
         };
         if positive(&moved) || !positive(start) {
             return moved;
@@ -126,14 +125,13 @@ impl Problem {
         }
     }
 
-    /// Constraints plus a positive mass at every node, relative to the mass of `start`.
+    /// Constraints plus positive masses at every node, relative to those of `start`.
     fn constraints_with_mass(&self, start: &[f64]) -> Constraints {
         let nodal = self.functions.nodal(start);
-        let largest = nodal.inertias[0].iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let least = POSITIVE * largest;
         let mut group = RowGroup::new("mass > 0");
-        let parts = self.functions.iter().zip(self.functions.ranges());
-        if let Some((mass, range)) = parts.into_iter().next() {
+        for (&f, values) in (self.functions.coefficient_set(0).iter()).zip(&nodal.inertias) {
+            let (mass, range) = (self.functions.get(f), &self.functions.ranges()[f]);
+            let least = POSITIVE * values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             for i in 0..self.system.grid.nodes() {
                 let row = mass.design.row(i).map(|(j, b)| (range.start + j, b));
                 let time = self.system.grid.time(i);

@@ -162,7 +162,10 @@ impl<'a, 'w> Attempts<'a, 'w> {
         };
         let truncated = self.truncated.iter().map(|(strategy, _)| *strategy);
         let order = truncated.chain(first).chain([GrowingHorizon]);
-        order.collect()
+        let has_equation = self.problem.system.structure.is_one();
+        order
+            .filter(|s| has_equation || *s != EquationError)
+            .collect()
     }
 
     /// Searches from one starting point; returns true after the last attempt.

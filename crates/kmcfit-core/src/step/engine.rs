@@ -1,4 +1,5 @@
-//! Operations on a system of one coordinate: response, adjoint, tangent, and the linearisation of its steps.
+//! Operations on a system: response, adjoint, tangents, and the linearisation of its steps. Explicit steps of one coordinate are compiled for
+//! common lists of elements; all others go through the assembled structure.
 
 use super::adjoint::{Adjoint, Gradient};
 use super::error::{SimulationError, require_finite, require_positive_mass};
@@ -82,7 +83,7 @@ macro_rules! with_model {
                 let $model = driven.model::<MOST_ELEMENTS, 4>(&RK4, list);
                 $call
             }
-            (Method::ImplicitMidpoint, _) => unreachable!("steps of assembled structures"),
+            (Method::ImplicitMidpoint, _) => unreachable!("an assembled structure"),
         }
     }};
 }
@@ -100,6 +101,11 @@ impl<'a> Driven<'a> {
         let grid = &system.grid;
         let count = nodal.coefficients.len();
         assert!(count <= system.laws().len(), "a term for each function");
+        assert_eq!(
+            nodal.inertias.len(),
+            system.structure.inertias().len(),
+            "values of each inertia"
+        );
         assert!(
             nodal.functions().all(|f| f.len() == grid.nodes()),
             "functions on the nodes"
@@ -124,10 +130,10 @@ impl<'a> Driven<'a> {
         'a: 'b,
     {
         let coefficients = &self.nodal.coefficients;
-        let stages = |part: &'a Option<StageSamples>| part.as_ref().map(StageSamples::stages);
+        let stages = |part: Option<&'a StageSamples>| part.map(StageSamples::stages);
         let driven = self
             .excitation
-            .filter(|e| e.force.is_some() || e.base.is_some());
+            .filter(|e| !e.forces.is_empty() || !e.frames.is_empty());
         Model {
             tableau,
             list,
@@ -135,18 +141,23 @@ impl<'a> Driven<'a> {
             coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
             drives: driven.map(|e| {
                 [Drive {
-                    force: stages(&e.force),
-                    base: stages(&e.base),
+                    force: stages(e.force(0)),
+                    base: stages(e.frame(0)),
                 }]
             }),
             dt: self.system.grid.step(),
         }
     }
 
+    /// True for steps that are not compiled: of several coordinates or supports, and implicit ones.
+    pub(crate) fn is_assembled(self) -> bool {
+        self.system.is_assembled()
+    }
+
     /// Response from `initial` over the nodes of `trajectory`; a record may be shorter than the grid.
     ///
     /// # Errors
-    /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
+    /// A [`SimulationError`] if the mass is not positive at some node, an implicit step is not solved, or the response overflows.
     pub fn respond(
         self,
         mode: EngineMode,
@@ -154,15 +165,17 @@ impl<'a> Driven<'a> {
         trajectory: &mut Trajectory,
     ) -> Result<(), SimulationError> {
         let grid = &self.system.grid;
-        require_positive_mass(grid, self.nodal)?;
         let nodes = trajectory.nodes();
+        if self.nodal.inertias.len() == 1 {
+            require_positive_mass(grid, self.nodal)?;
+        }
+        if self.is_assembled() {
+            return self.require(nodes).respond_assembled(initial, trajectory);
+        }
         let in_order = mode.is_in_paper_order(self.system, self.excitation, nodes);
         let is_linear = self.system.laws().iter().all(|law| law.is_linear());
         let x = [[initial.displacement(0)], [initial.velocity(0)]];
         let driven = self.require(nodes);
-        if self.system.method == Method::ImplicitMidpoint {
-            return driven.respond_assembled(initial, trajectory);
-        }
         let states = trajectory.columns_mut();
         with_model!(driven, model => match (in_order, is_linear) {
             (true, _) => in_paper_order(model, x, states),
@@ -183,7 +196,7 @@ impl<'a> Driven<'a> {
         gradient: CoefficientGradient,
     ) -> State {
         let driven = self.require(trajectory.nodes());
-        if self.system.method == Method::ImplicitMidpoint {
+        if self.is_assembled() {
             return driven.adjoint_assembled(trajectory, source, gradient);
         }
         let gradient = match gradient {
@@ -202,14 +215,16 @@ impl<'a> Driven<'a> {
 
     /// [`Driven::adjoint`] with the derivatives at the nodes.
     pub fn nodal_adjoint(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
-        let mut nodal =
-            NodalCoefficients::zeros(self.nodal.inertias[0].len(), self.system.laws().len());
+        let structure = &self.system.structure;
+        let (inertias, elements) = (structure.inertias().len(), structure.laws().len());
+        let mut nodal = NodalCoefficients::zeros(self.nodal.nodes(), inertias, elements);
         let gradient = CoefficientGradient::AtNodes(&mut nodal);
         let initial = self.adjoint(trajectory, source, gradient);
         SystemTangent { nodal, initial }
     }
 
-    /// Linearises the steps `from` to `from + 7` about the states of `trajectory`, which need not satisfy the equation of motion.
+    /// Linearises the steps `from` to `from + 7` of one coordinate about the states of `trajectory`, which need not satisfy the equation of
+    /// motion.
     pub(crate) fn linearise(
         self,
         trajectory: &Trajectory,
@@ -218,7 +233,7 @@ impl<'a> Driven<'a> {
         maps: &mut Maps,
     ) {
         let states = [[trajectory.displacement(0)], [trajectory.velocity(0)]];
-        if self.system.method == Method::ImplicitMidpoint {
+        if self.is_assembled() {
             return self.linearise_assembled(trajectory, from, maps);
         }
         with_model!(self, model => {
@@ -226,8 +241,12 @@ impl<'a> Driven<'a> {
         });
     }
 
-    /// Directional derivative of the response along `direction`.
+    /// Directional derivative of the response along `direction`; not a number where a step has no solution.
     pub fn tangent(self, trajectory: &Trajectory, direction: &SystemTangent) -> Trajectory {
+        if self.is_assembled() {
+            let one = std::slice::from_ref(direction);
+            return self.tangents(trajectory, one).remove(0);
+        }
         let functions: Vec<&[f64]> = direction.nodal.functions().collect();
         let mut out = Trajectory::zeros(1, trajectory.nodes());
         let mut x = [
@@ -250,7 +269,7 @@ impl<'a> Driven<'a> {
         out
     }
 
-    /// Passes each step of the record to `take`, with the derivatives in one lane of the maps.
+    /// Passes each step of a record of one coordinate to `take`, with the derivatives in one lane of the maps.
     pub(crate) fn each_step(
         self,
         trajectory: &Trajectory,
@@ -288,7 +307,7 @@ impl System {
         initial: &State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
-        let mut trajectory = Trajectory::zeros(1, self.grid.nodes());
+        let mut trajectory = Trajectory::zeros(initial.coordinates(), self.grid.nodes());
         let driven = Driven {
             system: self,
             nodal,

@@ -37,6 +37,9 @@ impl SimulationError {
     fn sentence(&self) -> String {
         let (time, value) = (significant(self.time, 4), self.value);
         match self.cause {
+            Cause::Mass if value.is_nan() => {
+                format!("the mass matrix is not positive definite at t = {time} s")
+            }
             Cause::Mass => format!(
                 "the mass is {} kg at t = {time} s, not positive",
                 significant(value, 6)

@@ -7,7 +7,7 @@ use crate::system::NodalCoefficients;
 pub enum CoefficientGradient<'a> {
     /// Derivatives with respect to nodal values.
     AtNodes(&'a mut NodalCoefficients),
-    /// Sums over the nodes, one per function, mass first: the derivatives with respect to constant functions.
+    /// Sums over the nodes, one per function, inertias first: the derivatives with respect to constant functions.
     Summed(&'a mut [f64]),
 }
 
@@ -15,7 +15,7 @@ impl CoefficientGradient<'_> {
     /// Number of functions.
     pub(crate) fn functions(&self) -> usize {
         match self {
-            CoefficientGradient::AtNodes(nodal) => 1 + nodal.coefficients.len(),
+            CoefficientGradient::AtNodes(nodal) => nodal.functions().count(),
             CoefficientGradient::Summed(sums) => sums.len(),
         }
     }

@@ -43,7 +43,7 @@ mod tests;
 mod trajectory;
 mod trials;
 
-pub use assembled::{Motion, MotionError, SupportMotion};
+pub use assembled::{Motion, MotionError, RowObservation, RowObserver};
 pub use engine::{Driven, EngineMode};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
 pub use error::{Cause, SimulationError};

@@ -104,7 +104,7 @@ pub fn observe_value(
 
 /// Cubic Hermite weights at `x` of a step of length `h`: value and slope on the left, on the right.
 #[inline(always)]
-fn hermite(x: f64, h: f64) -> [f64; 4] {
+pub(super) fn hermite(x: f64, h: f64) -> [f64; 4] {
     let (x2, x3) = (x * x, x * x * x);
     [
         1.0 - 3.0 * x2 + 2.0 * x3,
@@ -140,13 +140,12 @@ fn velocity(driven: Driven, states: &Trajectory, place: TimePoint) -> Observatio
         1.0 => Observation::state(3, v[i + 1]),
         x => {
             let at_end = |right: usize| {
-                let part =
-                    |p: &Option<StageSamples>| p.as_ref().map_or(0.0, |p| p.stages()[2 * right][i]);
+                let part = |p: Option<&StageSamples>| p.map_or(0.0, |p| p.stages()[2 * right][i]);
                 let input = driven
                     .excitation
                     .map_or(InputSample::default(), |e| InputSample {
-                        force: part(&e.force),
-                        base: part(&e.base),
+                        force: part(e.force(0)),
+                        base: part(e.frame(0)),
                     });
                 let here = Observation::state(2 * right, y[i + right]);
                 let speed = Observation::state(2 * right + 1, v[i + right]);

@@ -113,7 +113,7 @@ impl<'a> AdjointEquation<'a> {
         let (y, v) = (trajectory.displacement(0), trajectory.velocity(0));
         let z = &adjoint.displacement;
         let mut acceleration = curvature(y, self.dt);
-        if let Some(base) = excitation.and_then(|e| e.base.as_ref()) {
+        if let Some(base) = excitation.and_then(|e| e.frame(0)) {
             let base = base.at_nodes();
             acceleration.iter_mut().zip(base).for_each(|(a, b)| *a += b);
         }

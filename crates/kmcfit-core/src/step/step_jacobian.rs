@@ -1,11 +1,13 @@
 //! Linearisation of single steps, for methods with the states as unknowns.
 
 use super::Trajectory;
+use super::assembled::StepRow;
 use super::engine::{Driven, Maps};
 use crate::system::InputQuantity;
+use nalgebra::{DMatrix, DVector};
 
 /// The steps `x_{i+1} = Phi_i(x_i, p)` of a record and their derivatives; functions in the order of
-/// [`NodalCoefficients::functions`](crate::system::NodalCoefficients::functions), mass first.
+/// [`NodalCoefficients::functions`](crate::system::NodalCoefficients::functions), inertias first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepJacobians {
     components: usize,
@@ -65,9 +67,27 @@ fn by_state(maps: &Maps, l: usize, start: usize, end: usize) -> f64 {
 impl Driven<'_> {
     /// Linearises all steps about the node states `states`, which need not satisfy the equation of motion.
     pub fn step_jacobians(self, states: &Trajectory) -> StepJacobians {
-        let (components, functions) = (states.components(), self.system.laws().len() + 1);
+        let (components, functions) = (states.components(), self.system.structure.functions());
         let size = (1 + components + 2 * functions) * components;
         let mut values = Vec::with_capacity(size * (states.nodes() - 1));
+        if self.is_assembled() {
+            self.each_assembled_step(states, |end, rows| {
+                values.extend_from_slice(end);
+                for start in 0..components {
+                    values.extend(rows.iter().map(|row| row.state[start]));
+                }
+                for side in 0..2 {
+                    for f in 0..functions {
+                        values.extend(rows.iter().map(|row| row.functions[f][side]));
+                    }
+                }
+            });
+            return StepJacobians {
+                components,
+                functions,
+                values,
+            };
+        }
         self.each_step(states, false, |i, maps, l| {
             let ends = || 0..components;
             values.extend(ends().map(|end| states.component(end)[i] + maps.increment[end][l]));
@@ -87,25 +107,46 @@ impl Driven<'_> {
         }
     }
 
-    /// Derivatives of displacement and velocity after every step by those before it, and by the input `quantity` at both nodes, between
-    /// which it is linear.
+    /// Derivatives of the state after every step by that before it, and by the input `quantity` at both nodes, between which it is linear.
     pub fn input_derivatives(
         self,
         states: &Trajectory,
         quantity: InputQuantity,
-    ) -> Vec<[[[f64; 2]; 2]; 2]> {
+    ) -> Vec<(DMatrix<f64>, [DVector<f64>; 2])> {
+        let count = states.components();
         let mut all = Vec::with_capacity(states.nodes());
+        if self.is_assembled() {
+            let acting = self.acting(quantity);
+            self.each_assembled_step(states, |_, rows| {
+                let inputs = |row: &StepRow, side: usize| -> f64 {
+                    let by = match quantity {
+                        InputQuantity::Force => &row.forces,
+                        InputQuantity::BaseAcceleration => &row.frames,
+                    };
+                    acting.iter().map(|j| by[*j][side]).sum()
+                };
+                all.push((
+                    DMatrix::from_fn(count, count, |end, start| rows[end].state[start]),
+                    [0, 1].map(|side| DVector::from_fn(count, |end, _| inputs(&rows[end], side))),
+                ));
+            });
+            return all;
+        }
         self.each_step(states, true, |_, maps, l| {
             let inputs = match quantity {
                 InputQuantity::Force => &maps.forces[0],
                 InputQuantity::BaseAcceleration => &maps.bases[0],
             };
-            let pair = |of: &dyn Fn(usize) -> f64| [of(0), of(1)];
-            all.push([
-                [0, 1].map(|start| pair(&|end| by_state(maps, l, start, end))),
-                [0, 1].map(|side| pair(&|end| inputs[side][end][l])),
-            ]);
+            all.push((
+                DMatrix::from_fn(count, count, |end, start| by_state(maps, l, start, end)),
+                [0, 1].map(|side| DVector::from_fn(count, |end, _| inputs[side][end][l])),
+            ));
         });
         all
+    }
+
+    /// The coordinates on which an input acts, the first one where there is none.
+    fn acting(self, quantity: InputQuantity) -> Vec<usize> {
+        self.excitation.map_or(vec![0], |e| e.acting(quantity))
     }
 }

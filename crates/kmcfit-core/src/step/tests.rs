@@ -153,7 +153,7 @@ fn case_of(
             .map(|term| function(range(term), nodes))
             .collect();
         let excitation = (stepwise(nodes), stepwise(nodes))
-            .prop_map(move |(force, base)| is_driven.then_some(Excitation { force, base }));
+            .prop_map(move |(force, base)| is_driven.then_some(Excitation::one(force, base)));
         let system = System {
             grid: Grid::new(0.0, step * (nodes - 1) as f64, nodes).expect("a grid"),
             method,
@@ -220,7 +220,7 @@ impl Kernel for Observe<'_> {
 fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
     let functions = 1 + case.system.laws().len();
     std::array::from_fn(|lane| {
-        let mut nodal = NodalCoefficients::zeros(case.nodes(), functions - 1);
+        let mut nodal = NodalCoefficients::zeros(case.nodes(), 1, functions - 1);
         for (f, values) in nodal.functions_mut().enumerate() {
             match holds {
                 true if f == lane => values.fill(case.numbers[lane]),

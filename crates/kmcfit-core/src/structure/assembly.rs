@@ -1,7 +1,7 @@
 //! A structure as one table of inertias and elements.
 
 use super::banded::Banded;
-use super::{Ends, Law};
+use super::{Ends, Law, MOST_ELEMENTS};
 use nalgebra::DMatrix;
 use thiserror::Error;
 
@@ -24,6 +24,7 @@ pub struct Structure {
     /// Places in a banded matrix, and values there, of `b b^T` for the row of each function.
     patterns: Vec<Vec<(usize, f64)>>,
     bandwidth: usize,
+    is_one: bool,
 }
 
 /// A structure that cannot be made.
@@ -115,7 +116,22 @@ impl Structure {
             ends,
             patterns,
             bandwidth,
-        })
+            is_one: false,
+        }
+        .with_size())
+    }
+
+    /// The structure that knows whether it is one coordinate.
+    fn with_size(mut self) -> Self {
+        let ground = Ends::ground(0);
+        self.is_one = (self.coordinates, self.supports, self.inertias.len()) == (1, 0, 1)
+            && self
+                .inertias
+                .iter()
+                .chain(&self.ends)
+                .all(|ends| *ends == ground)
+            && self.laws.len() <= MOST_ELEMENTS;
+        self
     }
 
     /// One coordinate with its mass, and an element of each law between it and the ground.
@@ -128,6 +144,7 @@ impl Structure {
             patterns: vec![vec![(0, 1.0)]; 1 + laws.len()],
             laws,
             bandwidth: 0,
+            is_one: true,
         }
     }
 
@@ -152,6 +169,11 @@ impl Structure {
     /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
         self.coordinates
+    }
+
+    /// True for one coordinate with its mass, and at most one element of each law between it and the ground.
+    pub fn is_one(&self) -> bool {
+        self.is_one
     }
 
     /// Number of supports, whose indices follow those of the coordinates.
@@ -204,6 +226,20 @@ impl Structure {
     pub fn largest_rate(&self, functions: &[f64]) -> Option<f64> {
         let largest = |law| Some(self.relative_to_mass(law, functions)?.last()?.max(0.0));
         Some(largest(Law::Stiffness)?.sqrt().max(largest(Law::Damping)?))
+    }
+
+    /// [`Structure::largest_rate`] of functions of time, given by their values.
+    pub(crate) fn largest_rate_of<'a>(
+        &self,
+        functions: impl Iterator<Item = &'a [f64]>,
+    ) -> Option<f64> {
+        let inertias = self.inertias.len();
+        let extremes = functions.enumerate().map(|(f, values)| {
+            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if f < inertias { least } else { largest }
+        });
+        self.largest_rate(&extremes.collect::<Vec<f64>>())
     }
 
     /// Eigenvalues of the matrix of all elements of a law relative to the mass matrix, ascending.

@@ -54,9 +54,7 @@ impl TargetResponse {
         let response = &evaluation.trajectories[e];
         let nodes = experiment.nodes;
         let excitation = experiment.excitation.as_ref();
-        let force = excitation
-            .and_then(|x| x.force.as_ref())
-            .map(|f| f.at_nodes());
+        let force = excitation.and_then(|x| x.force(0)).map(|f| f.at_nodes());
         let force = force.unwrap_or_else(|| vec![0.0; nodes]);
         let acceleration = |i: usize| {
             let terms = problem.system.laws().iter().zip(&nodal.coefficients);

@@ -58,12 +58,13 @@ pub struct NodalCoefficients {
 }
 
 impl NodalCoefficients {
-    /// Zero values of one inertia and `coefficients` elements at `nodes` nodes.
-    pub fn zeros(nodes: usize, coefficients: usize) -> Self {
+    /// Zero values of `inertias` inertias and `coefficients` elements at `nodes` nodes.
+    pub fn zeros(nodes: usize, inertias: usize, coefficients: usize) -> Self {
+        // One by one: zeroed memory comes from the operating system, copies would be written.
+        let zeros = |count: usize| (0..count).map(|_| vec![0.0; nodes]).collect();
         Self {
-            inertias: vec![vec![0.0; nodes]],
-            // One by one: zeroed memory comes from the operating system, copies would be written.
-            coefficients: (0..coefficients).map(|_| vec![0.0; nodes]).collect(),
+            inertias: zeros(inertias),
+            coefficients: zeros(coefficients),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Excitation of a system: force and base acceleration at the stages of the steps.
 
 use super::TimePoint;
+use crate::structure::Structure;
 use serde::Serialize;
 use std::ops::Range;
 use std::sync::Arc;
@@ -88,6 +89,12 @@ impl StageSamples {
         (0..self.steps()).map(|i| self.step(i))
     }
 
+    /// Value at a point, linear between the ends of its step.
+    pub(crate) fn at(&self, place: TimePoint) -> f64 {
+        let [left, _, right] = self.step(place.step);
+        left * (1.0 - place.fraction) + right * place.fraction
+    }
+
     /// True if zero at all stages.
     pub fn is_zero(&self) -> bool {
         let mut all = self.stages().into_iter().flatten();
@@ -102,48 +109,105 @@ impl StageSamples {
     }
 }
 
-/// Force and base acceleration of one experiment.
+/// Motion of a support over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SupportMotion {
+    /// Displacement, m.
+    pub displacement: StageSamples,
+    /// Velocity, m/s.
+    pub velocity: StageSamples,
+    /// Acceleration, m/s^2: it acts through inertias that join coordinates and supports.
+    pub acceleration: StageSamples,
+}
+
+/// Forces, accelerations of frames and motion of the supports in one experiment.
 ///
-/// Under base excitation `y` is relative to the base `b(t)`, and the equation of motion is
+/// Under base excitation coordinates are relative to the base `b(t)`, their frame; the equation of motion of one coordinate is
 /// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Force, N; `None` for no force.
-    pub force: Option<StageSamples>,
-    /// Acceleration `b''` of the base, m/s^2; `None` for a base at rest.
-    pub base: Option<StageSamples>,
+    /// Forces, N, with the coordinates on which they act; at most one on each.
+    pub forces: Vec<(usize, StageSamples)>,
+    /// Accelerations `b''`, m/s^2, of the frames relative to which coordinates are measured; at most one for each.
+    pub frames: Vec<(usize, StageSamples)>,
+    /// Motion of each support of the structure.
+    pub supports: Vec<SupportMotion>,
 }
 
 impl Excitation {
-    /// A force that is linear between its nodal values (N), with the base at rest.
-    pub fn force_at_nodes(nodes: &[f64]) -> Self {
+    /// Of one coordinate: its force (N), and the acceleration of the base (m/s^2).
+    pub fn one(force: Option<StageSamples>, base: Option<StageSamples>) -> Self {
         Self {
-            force: Some(StageSamples::linear(nodes)),
-            base: None,
+            forces: force.into_iter().map(|force| (0, force)).collect(),
+            frames: base.into_iter().map(|base| (0, base)).collect(),
+            supports: Vec::new(),
         }
     }
 
-    /// True without force and base motion.
+    /// A force on the first coordinate that is linear between its nodal values (N), with the base at rest.
+    pub fn force_at_nodes(nodes: &[f64]) -> Self {
+        Self::one(Some(StageSamples::linear(nodes)), None)
+    }
+
+    /// The force on a coordinate, if there is one.
+    pub fn force(&self, coordinate: usize) -> Option<&StageSamples> {
+        find(&self.forces, coordinate)
+    }
+
+    /// The acceleration of the frame of a coordinate, if it moves.
+    pub fn frame(&self, coordinate: usize) -> Option<&StageSamples> {
+        find(&self.frames, coordinate)
+    }
+
+    /// The samples of a quantity that acts on the first coordinate.
+    pub(crate) fn quantity(&self, quantity: InputQuantity) -> Option<&StageSamples> {
+        match quantity {
+            InputQuantity::Force => self.force(0),
+            InputQuantity::BaseAcceleration => self.frame(0),
+        }
+    }
+
+    fn parts(&self) -> impl Iterator<Item = &StageSamples> {
+        let supports = self.supports.iter();
+        let supports = supports.flat_map(|s| [&s.displacement, &s.velocity, &s.acceleration]);
+        let inputs = self.forces.iter().chain(&self.frames);
+        inputs.map(|(_, samples)| samples).chain(supports)
+    }
+
+    /// The excitation with each of its functions of time replaced.
+    fn map(&self, change: impl Fn(&StageSamples) -> StageSamples) -> Self {
+        let supports = self.supports.iter().map(|s| SupportMotion {
+            displacement: change(&s.displacement),
+            velocity: change(&s.velocity),
+            acceleration: change(&s.acceleration),
+        });
+        let each = |inputs: &[(usize, StageSamples)]| {
+            let each = inputs.iter().map(|(on, samples)| (*on, change(samples)));
+            each.collect()
+        };
+        Self {
+            forces: each(&self.forces),
+            frames: each(&self.frames),
+            supports: supports.collect(),
+        }
+    }
+
+    /// True without forces and motion of frames and supports.
     pub fn is_zero(&self) -> bool {
-        let zero = |part: &Option<StageSamples>| part.as_ref().is_none_or(StageSamples::is_zero);
-        zero(&self.force) && zero(&self.base)
+        self.parts().all(StageSamples::is_zero)
     }
 
     /// Excitation of the first `steps` steps.
     #[must_use]
     pub fn first(&self, steps: usize) -> Self {
-        let short = |part: &StageSamples| StageSamples::new(part.iter().take(steps));
-        Self {
-            force: self.force.as_ref().map(short),
-            base: self.base.as_ref().map(short),
-        }
+        self.map(|part| StageSamples::new(part.iter().take(steps)))
     }
 
     /// Excitation of the steps `steps` on steps of half the length: old stages become ends of new steps, with linear interpolation
     /// between them.
     #[must_use]
     pub fn halved(&self, steps: Range<usize>) -> Self {
-        let halves = |part: &StageSamples| {
+        self.map(|part| {
             let halves = steps.clone().flat_map(|i| {
                 let [left, middle, right] = part.step(i);
                 [
@@ -152,52 +216,76 @@ impl Excitation {
                 ]
             });
             StageSamples::new(halves)
-        };
-        Self {
-            force: self.force.as_ref().map(halves),
-            base: self.base.as_ref().map(halves),
-        }
+        })
     }
 
-    /// Force and base acceleration at a point, linear between the ends of its step.
+    /// The force on the first coordinate and the acceleration of the base at a point.
     pub fn input_at(&self, place: TimePoint) -> InputSample {
-        let at = |part: &Option<StageSamples>| {
-            part.as_ref().map_or(0.0, |p| {
-                let [left, _, right] = p.step(place.step);
-                left * (1.0 - place.fraction) + right * place.fraction
-            })
-        };
+        let at = |part: Option<&StageSamples>| part.map_or(0.0, |part| part.at(place));
         InputSample {
-            force: at(&self.force),
-            base: at(&self.base),
+            force: at(self.force(0)),
+            base: at(self.frame(0)),
         }
     }
 
-    /// The excitation with values at the nodes, linear between them, added to one of its quantities.
+    /// The coordinates on which a quantity acts: that of the first force, or those whose frames move; the first one where there is none.
+    pub(crate) fn acting(&self, quantity: InputQuantity) -> Vec<usize> {
+        let on = |inputs: &[(usize, StageSamples)], most: usize| -> Vec<usize> {
+            match inputs {
+                [] => vec![0],
+                inputs => inputs.iter().map(|(on, _)| *on).take(most).collect(),
+            }
+        };
+        match quantity {
+            InputQuantity::Force => on(&self.forces, 1),
+            InputQuantity::BaseAcceleration => on(&self.frames, usize::MAX),
+        }
+    }
+
+    /// The excitation with values at the nodes, linear between them, added to a quantity where it acts.
     #[must_use]
     pub(crate) fn plus(&self, quantity: InputQuantity, nodes: &[f64]) -> Self {
         let mut sum = self.clone();
-        let part = match quantity {
-            InputQuantity::Force => &mut sum.force,
-            InputQuantity::BaseAcceleration => &mut sum.base,
+        let inputs = match quantity {
+            InputQuantity::Force => &mut sum.forces,
+            InputQuantity::BaseAcceleration => &mut sum.frames,
         };
         let added = StageSamples::linear(nodes);
-        *part = Some(match part {
-            None => added,
-            Some(part) => {
-                let pairs = part.iter().zip(added.iter());
-                let step = |(a, b): ([f64; 3], [f64; 3])| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-                StageSamples::new(pairs.map(step))
+        for coordinate in self.acting(quantity) {
+            match inputs.iter_mut().find(|(on, _)| *on == coordinate) {
+                None => inputs.push((coordinate, added.clone())),
+                Some((_, part)) => {
+                    let pairs = part.iter().zip(added.iter());
+                    let step =
+                        |(a, b): ([f64; 3], [f64; 3])| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+                    *part = StageSamples::new(pairs.map(step));
+                }
             }
-        });
+        }
         sum
+    }
+
+    /// True if it has one force and one frame for each coordinate at most, and a motion for each support.
+    pub(crate) fn acts_on(&self, structure: &Structure) -> bool {
+        let is_once = |inputs: &[(usize, StageSamples)]| {
+            let is_first = |i: usize| inputs[..i].iter().all(|(on, _)| *on != inputs[i].0);
+            let mut each = inputs.iter().enumerate();
+            each.all(|(i, (on, _))| *on < structure.coordinates() && is_first(i))
+        };
+        self.supports.len() == structure.supports()
+            && is_once(&self.forces)
+            && is_once(&self.frames)
     }
 
     /// True if the excitation covers a response over `nodes` nodes.
     pub(crate) fn covers(&self, nodes: usize) -> bool {
-        let parts = [&self.force, &self.base];
-        parts.into_iter().flatten().all(|p| p.steps() + 1 >= nodes)
+        self.parts().all(|part| part.steps() + 1 >= nodes)
     }
+}
+
+fn find(inputs: &[(usize, StageSamples)], coordinate: usize) -> Option<&StageSamples> {
+    let found = inputs.iter().find(|(on, _)| *on == coordinate);
+    found.map(|(_, samples)| samples)
 }
 
 /// A quantity that excites a system.
@@ -228,7 +316,7 @@ impl InputQuantity {
     }
 }
 
-/// Force and acceleration of the base at one time.
+/// Force on one coordinate and acceleration of the base at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct InputSample {
     /// Force, N.
@@ -243,12 +331,12 @@ mod tests {
 
     #[test]
     fn half_steps_meet_the_old_stages_and_are_linear_between() {
-        let whole = Excitation {
-            force: Some(StageSamples::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
-            base: Some(StageSamples::new(vec![[0.5, 0.25, 1.0], [0.0; 3]])),
-        };
+        let whole = Excitation::one(
+            Some(StageSamples::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
+            Some(StageSamples::new(vec![[0.5, 0.25, 1.0], [0.0; 3]])),
+        );
         let halves = whole.halved(0..2);
-        let force = halves.force.unwrap();
+        let force = halves.force(0).unwrap();
         let expected = [
             [1.0, 2.5, 4.0],
             [4.0, 3.5, 3.0],
@@ -256,11 +344,11 @@ mod tests {
             [0.0, 4.0, 8.0],
         ];
         assert!(force.iter().eq(expected));
-        let base = halves.base.unwrap();
+        let base = halves.frame(0).unwrap();
         let expected = [[0.5, 0.375, 0.25], [0.25, 0.625, 1.0]];
         assert!(base.iter().take(2).eq(expected));
-        let second = whole.halved(1..2).force.unwrap();
-        assert!(second.iter().eq(force.iter().skip(2)));
+        let second = whole.halved(1..2);
+        assert!(second.force(0).unwrap().iter().eq(force.iter().skip(2)));
         assert_eq!(Excitation::default().halved(0..0), Excitation::default());
     }
 

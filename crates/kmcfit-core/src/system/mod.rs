@@ -13,7 +13,7 @@ mod stability;
 
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use grid::{Grid, TimePoint, round_time};
-pub use input::{Excitation, InputQuantity, InputSample, StageSamples};
+pub use input::{Excitation, InputQuantity, InputSample, StageSamples, SupportMotion};
 pub use method::Method;
 
 use crate::structure::{Law, MOST_ELEMENTS, Structure};
@@ -36,6 +36,11 @@ impl System {
     /// Laws of the elements.
     pub fn laws(&self) -> &[Law] {
         self.structure.laws()
+    }
+
+    /// True where steps go through the assembled structure: all but explicit steps of one coordinate.
+    pub(crate) fn is_assembled(&self) -> bool {
+        !self.structure.is_one() || self.method == Method::ImplicitMidpoint
     }
 
     /// Width of Coulomb friction, m/s; `None` without it.

@@ -16,15 +16,20 @@ impl Method {
 }
 
 impl System {
-    /// Smallest number of nodes with stable steps for mass, damping and stiffness of `nodal`.
+    /// Smallest number of nodes with stable steps for the linear springs and dampers of `nodal`.
     pub fn stable_nodes(&self, nodal: &NodalCoefficients) -> usize {
         let steps = self.grid.duration() * self.largest_rate(nodal) / self.method.stability_limit();
         // The cast saturates.
         (steps.ceil() as usize).saturating_add(1)
     }
 
-    /// Largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s; nodes where it is not finite are omitted.
+    /// Of one coordinate the largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s, where nodes at which it is not finite
+    /// are omitted; of several ones a bound ([`Structure::largest_rate`](crate::structure::Structure::largest_rate)).
     fn largest_rate(&self, nodal: &NodalCoefficients) -> f64 {
+        if !self.structure.is_one() {
+            let rate = self.structure.largest_rate_of(nodal.functions());
+            return rate.unwrap_or(0.0);
+        }
         let of = |wanted: Law| {
             let index = self.laws().iter().position(|term| *term == wanted);
             index.and_then(|index| nodal.coefficients.get(index))

@@ -63,8 +63,8 @@ impl Truth<'_> {
             dt: self.system.grid.step(),
             mass: self.nodal.inertias[0].clone(),
             terms: terms.zip(self.nodal.coefficients.iter().cloned()).collect(),
-            force: part(&|e| e.force.clone()),
-            base: part(&|e| e.base.clone()),
+            force: part(&|e| e.force(0).cloned()),
+            base: part(&|e| e.frame(0).cloned()),
             initial: (self.initial.displacement(0), self.initial.velocity(0)),
         }
     }

@@ -204,10 +204,11 @@ impl Case {
             .unwrap()
             .with_scalars(scalars);
         let initial = State::one(self.initial[0], self.initial[1]);
-        let mut experiment = Experiment::free("all", initial, nodes).with_excitation(Excitation {
-            force: Some(StageSamples::new(self.force.clone())),
-            base: Some(StageSamples::new(self.base.clone())),
-        });
+        let mut experiment =
+            Experiment::free("all", initial, nodes).with_excitation(Excitation::one(
+                Some(StageSamples::new(self.force.clone())),
+                Some(StageSamples::new(self.base.clone())),
+            ));
         experiment.initial_parameters = vec![Some(0), Some(1)];
         for (n, samples) in self.channels.iter().enumerate() {
             let time = |(i, x): &(usize, f64)| (*i as f64 + x) * grid.step();

@@ -45,10 +45,7 @@ fn sampled(grid: &Grid, f: impl Fn(f64) -> f64) -> StageSamples {
 }
 
 fn pushed(force: StageSamples) -> Excitation {
-    Excitation {
-        force: Some(force),
-        base: None,
-    }
+    Excitation::one(Some(force), None)
 }
 
 /// The error falls as the step to the power of the method's order when the step is halved.
@@ -135,10 +132,8 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                         ChannelKind::Displacement => 1.0,
                         _ => -w * w,
                     };
-                    let excitation = Excitation {
-                        force: None,
-                        base: Some(sampled(&grid, |t| -w * w * (w * t).cos())),
-                    };
+                    let excitation =
+                        Excitation::one(None, Some(sampled(&grid, |t| -w * w * (w * t).cos())));
                     let nodal = constants(nodes, &[M, C, K]);
                     let response = system.forward(&nodal, &rest(), Some(&excitation)).unwrap();
                     let settled: Vec<usize> = (nodes * 5 / 6..nodes).collect();

@@ -397,10 +397,7 @@ fn base() -> StageSamples {
 }
 
 fn forced() -> Excitation {
-    Excitation {
-        force: Some(force()),
-        base: None,
-    }
+    Excitation::one(Some(force()), None)
 }
 
 #[test]
@@ -499,10 +496,7 @@ fn a_band_pass_filter() {
 /// a stiffness of their own.
 #[test]
 fn all_together() {
-    let both = Excitation {
-        force: Some(force()),
-        base: Some(base()),
-    };
+    let both = Excitation::one(Some(force()), Some(base()));
     let displacement = ChannelSpec::of(ChannelKind::Displacement, scattered(150, 21))
         .unknown_sensor([0.8, 0.2, 0.03], 2);
     let mut velocity = ChannelSpec::of(ChannelKind::Velocity, scattered(120, 22));

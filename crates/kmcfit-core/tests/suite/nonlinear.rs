@@ -166,7 +166,7 @@ fn stick_slip() -> Case {
 fn a_mass_that_sticks_in_every_cycle_to_one_per_cent() {
     let case = stick_slip();
     let response = case.response();
-    let force = case.excitation.force.as_ref().unwrap().at_nodes();
+    let force = case.excitation.force(0).unwrap().at_nodes();
     for cycle in 0..PERIODS {
         let nodes = cycle * STEPS..(cycle + 1) * STEPS;
         // At rest except for the creep of the smoothed friction, which alone balances the force.

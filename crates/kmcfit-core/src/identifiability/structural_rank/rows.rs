@@ -116,7 +116,7 @@ impl Inputs {
         let initially = span.len();
         let steps = problem.system.grid.nodes() - 1;
         let base = |r: &Experiment, i: usize, s: usize| {
-            at_stage(r.excitation.as_ref().and_then(|e| e.base.as_ref()), i, s)
+            at_stage(r.excitation.as_ref().and_then(|e| e.frame(0)), i, s)
         };
         let force = |r: &Experiment, i: usize, s: usize| at_stage(force_of(r), i, s);
         let mut after = Vec::with_capacity(steps);
@@ -134,7 +134,7 @@ impl Inputs {
             silent.push(records.iter().all(|r| before(r) && at_node(r)));
         }
         let still = |r: &&Experiment| {
-            let base = r.excitation.as_ref().and_then(|e| e.base.as_ref());
+            let base = r.excitation.as_ref().and_then(|e| e.frame(0));
             base.is_none_or(|b| b.is_zero())
         };
         let nodal = records.iter().all(|r| {

@@ -3,13 +3,14 @@
 mod observation_rows;
 mod sensitivity_layout;
 
-use super::{Evaluation, SimulatedRecord};
+use super::{Evaluation, RecordTangent, SimulatedRecord};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
 use crate::simd::tall_qr::{RowBlock, order_by};
 use crate::step::tangents::TILE;
+use crate::system::SystemTangent;
 use nalgebra::DMatrix;
 use observation_rows::JacobianRows;
 use sensitivity_layout::SensitivityLayout;
@@ -19,6 +20,9 @@ impl Problem {
     /// Jacobian of the predictions (rows: samples of all channels of all experiments, in order) with respect to the
     /// parameters: [`Problem::predictions_tangent`] of all unit vectors, to machine precision.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
+        if !self.system.structure.is_one() {
+            return self.jacobian_of_structure(evaluation);
+        }
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
         self.each_row_block(evaluation, &order, |block| {
@@ -58,6 +62,46 @@ impl Problem {
         }
     }
 
+    /// Jacobian by tangents that share the linearised steps.
+    fn jacobian_of_structure(&self, evaluation: &Evaluation) -> DMatrix<f64> {
+        let parameters = self.parameters();
+        let mut jacobian = DMatrix::zeros(self.sample_count(), parameters);
+        let unit = |j: usize| {
+            let mut unit = vec![0.0; parameters];
+            unit[j] = 1.0;
+            unit
+        };
+        for first in (0..parameters).step_by(LANES) {
+            let columns = first..(first + LANES).min(parameters);
+            let units: Vec<Vec<f64>> = columns.clone().map(unit).collect();
+            let mut row = 0;
+            for (e, experiment) in self.experiments.iter().enumerate() {
+                let view = self.view(evaluation, e);
+                let along = units
+                    .iter()
+                    .map(|unit| self.system_tangent(experiment, unit));
+                let along: Vec<SystemTangent> = along.collect();
+                let responses = view.driven().tangents(view.response, &along);
+                let tangents = along.iter().zip(&responses).zip(&units);
+                let tangents = tangents.map(|((along, response), unit)| RecordTangent {
+                    nodal: &along.nodal,
+                    response,
+                    scalars: self.scalars(unit),
+                });
+                let tangents: Vec<RecordTangent> = tangents.collect();
+                for channel in &experiment.channels {
+                    let changes = channel.row_tangents(view, &tangents);
+                    for (j, change) in columns.clone().zip(changes) {
+                        let mut column = jacobian.column_mut(j);
+                        column.as_mut_slice()[row..row + channel.len()].copy_from_slice(&change);
+                    }
+                    row += channel.len();
+                }
+            }
+        }
+        jacobian
+    }
+
     /// Jacobian by one tangent solve per column, for values near the limits of the floating-point range, where the order of
     /// operations determines what is finite.
     fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
@@ -83,15 +127,15 @@ impl Problem {
         order_by(&first.map(|node| node as usize).collect::<Vec<_>>())
     }
 
-    /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: no sensor parameter is estimated, no
-    /// channel is filtered, and no noise is correlated.
+    /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: there is one coordinate, no sensor parameter is
+    /// estimated, no channel is filtered, and no noise is correlated.
     pub(crate) fn is_computed_by_blocks(&self) -> bool {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty()
                 && channel.correlation().is_none()
                 && !channel.sensor().is_estimated()
         };
-        self.channels().all(is_plain)
+        self.system.structure.is_one() && self.channels().all(is_plain)
     }
 
     /// Passes the rows of the Jacobian to `take` in blocks, with columns in `order` ([`Problem::places`]) and without the

@@ -3,10 +3,10 @@
 
 use crate::constraints::Rows;
 use crate::noise::Correlation;
-use crate::objective::{Evaluation, SimulatedRecord};
+use crate::objective::{Evaluation, RowSamples, SimulatedRecord};
 use crate::problem::Problem;
 use crate::qp::{ResponseVariables, StageLayout, Subproblem};
-use crate::record::{Channel, ChannelKind, Experiment, Majorant, Weighting};
+use crate::record::{Channel, ChannelKind, Experiment, Majorant, Sensor, Weighting};
 use crate::rows::merge_columns;
 use crate::signal::SecondOrder;
 use crate::step::{StepJacobians, Trajectory};
@@ -152,6 +152,17 @@ impl UnknownColumns<'_> {
         }
     }
 
+    fn add_sensor(
+        &self,
+        channel: &Channel,
+        factors: [f64; Sensor::PARAMETERS],
+        entries: &mut Vec<(usize, f64)>,
+    ) {
+        for (index, factor) in channel.sensor().indices().into_iter().zip(factors) {
+            entries.extend(index.map(|index| (self.scalar(index), factor)));
+        }
+    }
+
     fn add_samples(
         &self,
         channel: &Channel,
@@ -163,10 +174,27 @@ impl UnknownColumns<'_> {
         // A displacement at a node by a known sensor is the state itself.
         let known = !channel.sensor().is_estimated();
         let plain = known && channel.kind() == ChannelKind::Displacement;
-        let row = |i: usize, entries: &mut Vec<(usize, f64)>| {
+        let coordinate = plain.then(|| channel.coordinate()).flatten();
+        let mut samples = (!view.system.structure.is_one()).then(|| RowSamples::new(channel, view));
+        let mut row = |i: usize, entries: &mut Vec<(usize, f64)>| {
             let place = channel.place(view, i);
-            if let Some(node) = plain.then(|| place.as_node()).flatten() {
-                entries.extend(self.state(node, 0).map(|index| (index, gain)));
+            if let (Some(j), Some(node)) = (coordinate, place.as_node()) {
+                entries.extend(self.state(node, j).map(|index| (index, gain)));
+                return;
+            }
+            if let Some(samples) = &mut samples {
+                let factors = known.then_some([0.0; Sensor::PARAMETERS]);
+                let factors = factors.unwrap_or_else(|| samples.sensor_factors(i));
+                let sensed = samples.observe(i);
+                for (side, by) in sensed.states.iter().enumerate() {
+                    for (q, slope) in by.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
+                        let index = self.state(place.step + side, q);
+                        entries.extend(index.map(|index| (index, gain * slope)));
+                    }
+                }
+                let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
+                self.add_function_slopes(place.step, &slope, entries);
+                self.add_sensor(channel, factors, entries);
                 return;
             }
             let sensed = channel.sensed(view, i);
@@ -178,10 +206,11 @@ impl UnknownColumns<'_> {
             }
             let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
             self.add_function_slopes(place.step, &slope, entries);
-            let factors = channel.sensor_factors(view, i, sensed.value);
-            for (index, factor) in channel.sensor().indices().into_iter().zip(factors) {
-                entries.extend(index.map(|index| (self.scalar(index), factor)));
-            }
+            self.add_sensor(
+                channel,
+                channel.sensor_factors(view, i, sensed.value),
+                entries,
+            );
         };
         let Majorant { roots, weighted } = channel.majorant(predicted);
         if channel.filter().is_empty() && channel.correlation().is_none() {

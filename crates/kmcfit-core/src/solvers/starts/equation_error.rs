@@ -4,9 +4,12 @@
 use crate::problem::Problem;
 use crate::solvers::methods::equation_error::equation_error;
 
-/// Minimum of the equation error; the start as given where it cannot be simulated.
+/// Minimum of the equation error; the start as given where it cannot be simulated, and with several coordinates.
 pub(in crate::solvers) fn equation_error_start(problem: &Problem, start: &[f64]) -> Vec<f64> {
-    let found = equation_error(problem, start).ok();
-    let found = found.filter(|theta| problem.evaluate(theta).is_ok());
+    let is_one = problem.system.structure.is_one();
+    let found = is_one.then(|| equation_error(problem, start).ok());
+    let found = found
+        .flatten()
+        .filter(|theta| problem.evaluate(theta).is_ok());
     found.unwrap_or_else(|| start.to_vec())
 }

@@ -1,11 +1,12 @@
 //! Starting point by a scan of the natural frequency.
 //!
 //! A response of a wrong period fits worse than no response, so that a search from a distant start ends in a local minimum. With
-//! constant coefficients the frequency `sqrt(k/m)` is one number: steps from [`FREQUENCIES`] values of it, those of the [`KEPT`] lowest costs
+//! constant coefficients the lowest natural frequency is one number: steps from [`FREQUENCIES`] values of it, those of the [`KEPT`] lowest costs
 //! and then the best one continued, give the level of each function; three knots give their course, and the functions of the problem their
 //! details.
 //!
-//! The steps are taken in the logarithms of mass, damping and stiffness, which stay positive without a bound.
+//! Masses and springs that are free are multiplied by one factor each for a frequency. The steps are taken in the logarithms of masses,
+//! dampings and stiffnesses, which stay positive without a bound.
 
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -135,54 +136,55 @@ fn transferred(from: &Problem, theta: &[f64], to: &Problem) -> Vec<f64> {
 /// Constants of the lowest cost after steps from each frequency, continued; `None` where neither mass nor stiffness is free or no
 /// response can be simulated.
 fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<f64>> {
-    let functions = &constants.functions;
-    let set = functions.coefficient_set(0);
-    let terms = problem.system.laws();
-    let at = |kind: Law| {
-        terms
-            .iter()
-            .position(|t| *t == kind)
-            .map(|place| set[place + 1])
-    };
-    let (mass, stiffness) = (set[0], at(Law::Stiffness)?);
-    let first = |f: usize| functions.ranges()[f].clone().next();
-    (first(mass).is_some() || first(stiffness).is_some()).then_some(())?;
+    let (functions, structure) = (&constants.functions, &problem.system.structure);
     let base = transferred(problem, start, constants);
-    let level = |f: usize| -> f64 {
-        let values = &functions.values(&base)[f];
-        values.iter().sum::<f64>() / values.len() as f64
+    let values = functions.values(&base);
+    let mean = |f: &usize| values[*f].iter().sum::<f64>() / values[*f].len() as f64;
+    let set = functions.coefficient_set(0);
+    let mut levels: Vec<f64> = set.iter().map(mean).collect();
+    let inertias = set.inertias();
+    let of_law = |wanted: Law| {
+        let laws = structure.laws().iter().enumerate();
+        let found = laws.filter(|(_, law)| **law == wanted);
+        found.map(|(e, _)| inertias + e).collect::<Vec<usize>>()
     };
-    let (m, k) = (level(mass), level(stiffness));
-    let k = if k > 0.0 { k } else { m };
-    let place = (first(mass), first(stiffness));
+    let (masses, springs) = ((0..inertias).collect::<Vec<_>>(), of_law(Law::Stiffness));
+    let average = |levels: &[f64], places: &[usize]| {
+        places.iter().map(|p| levels[*p]).sum::<f64>() / places.len() as f64
+    };
+    let mass = average(&levels, &masses);
+    for place in &springs {
+        if levels[*place] <= 0.0 {
+            levels[*place] = mass;
+        }
+    }
+    let parameter = |place: &usize| Some((*place, functions.ranges()[set[*place]].clone().next()?));
+    let free = |places: &[usize]| places.iter().filter_map(parameter).collect::<Vec<_>>();
+    let (free_masses, free_springs) = (free(&masses), free(&springs));
+    let lowest = |levels: &[f64]| structure.eigenvalues(levels)?.first().copied();
+    let from_square = lowest(&levels).filter(|square| *square > 0.0)?;
+    (!free_masses.is_empty() || !free_springs.is_empty()).then_some(())?;
     let from = |omega: f64| -> Vec<f64> {
         let mut theta = base.clone();
-        let ratio = omega * omega * m / k;
-        let (to_mass, to_stiffness) = match place {
-            (Some(i), Some(j)) => {
-                theta[i] = m / ratio.sqrt();
-                theta[j] = k * ratio.sqrt();
-                (m / ratio.sqrt(), k * ratio.sqrt())
-            }
-            (Some(i), None) => {
-                theta[i] = m / ratio;
-                (m / ratio, k)
-            }
-            (None, Some(j)) => {
-                theta[j] = k * ratio;
-                (m, k * ratio)
-            }
-            (None, None) => (m, k),
+        let ratio = omega * omega / from_square;
+        let [to_mass, to_spring] = match (free_masses.is_empty(), free_springs.is_empty()) {
+            (false, false) => [1.0 / ratio.sqrt(), ratio.sqrt()],
+            (false, true) => [1.0 / ratio, 1.0],
+            (true, _) => [1.0, ratio],
         };
-        if let Some(i) = at(Law::Damping).and_then(first) {
-            let least = 2.0 * LEAST_DAMPING_RATIO * (to_mass * to_stiffness).sqrt();
-            theta[i] = theta[i].max(least);
+        (free_masses.iter()).for_each(|(place, i)| theta[*i] = levels[*place] * to_mass);
+        (free_springs.iter()).for_each(|(place, i)| theta[*i] = levels[*place] * to_spring);
+        let critical = (mass * to_mass * average(&levels, &springs) * to_spring).sqrt();
+        for (_, i) in free(&of_law(Law::Damping)) {
+            theta[i] = theta[i].max(2.0 * LEAST_DAMPING_RATIO * critical);
         }
         theta
     };
     let frequency = |theta: &[f64]| {
-        let of = |f: Option<usize>, fixed: f64| f.map_or(fixed, |i| theta[i]);
-        (of(place.1, k) / of(place.0, m)).sqrt()
+        let mut levels = levels.clone();
+        let each = free_masses.iter().chain(&free_springs);
+        each.for_each(|(place, i)| levels[*place] = theta[*i]);
+        lowest(&levels).unwrap_or(f64::NAN).sqrt()
     };
     let starts: Vec<Vec<f64>> = frequencies(problem)?.into_iter().map(from).collect();
     let mut points = descents(constants, SCAN_STEPS[0], starts);

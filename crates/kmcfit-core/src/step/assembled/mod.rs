@@ -3,11 +3,14 @@
 //! `stage` solves the equation of motion at one stage, `step` goes through the stages of a step, forwards and back, `sweeps` along a record.
 //! The small structures of [`Model`](super::stage::Model) are steps of the same methods in SIMD lanes.
 
-mod single;
+mod driven;
+mod observer;
 mod stage;
 mod step;
 mod sweeps;
 #[cfg(test)]
 mod tests;
 
-pub use sweeps::{Motion, MotionError, SupportMotion};
+pub use observer::{RowObservation, RowObserver};
+pub(in crate::step) use sweeps::StepRow;
+pub use sweeps::{Motion, MotionError};

@@ -6,7 +6,7 @@ use super::super::tableau::At;
 use super::stage::{StageShares, StageValues, Trouble};
 use super::step::{Source, Steps};
 use crate::structure::Structure;
-use crate::system::{Method, StageSamples};
+use crate::system::{Excitation, Method, StageSamples};
 use thiserror::Error;
 
 /// A structure over a record: the values of its functions at the nodes, and what moves it.
@@ -20,23 +20,8 @@ pub struct Motion<'a> {
     pub step: f64,
     /// Values of each function of the structure at the nodes, between which it is linear.
     pub functions: &'a [&'a [f64]],
-    /// Forces (N) on coordinates.
-    pub forces: &'a [(usize, &'a StageSamples)],
-    /// Accelerations (m/s^2) of the frames relative to which coordinates are measured.
-    pub frames: &'a [(usize, &'a StageSamples)],
-    /// Motion of each support.
-    pub supports: &'a [SupportMotion<'a>],
-}
-
-/// The given motion of a support.
-#[derive(Debug, Clone, Copy)]
-pub struct SupportMotion<'a> {
-    /// Displacement, m.
-    pub displacement: &'a StageSamples,
-    /// Velocity, m/s.
-    pub velocity: &'a StageSamples,
-    /// Acceleration, m/s^2: it acts through inertias that join coordinates and supports.
-    pub acceleration: &'a StageSamples,
+    /// What moves it; `None` for a free motion.
+    pub excitation: Option<&'a Excitation>,
 }
 
 /// A motion that cannot be computed.
@@ -75,19 +60,21 @@ impl Source<f64> for Changes<'_> {
 impl Source<f64> for Motion<'_> {
     fn read(&self, step: usize, at: At, values: &mut StageValues<f64>) {
         Changes(self.functions).read(step, at, values);
+        let Some(excitation) = self.excitation else {
+            return;
+        };
         let sample = |samples: &StageSamples| samples.stages()[at as usize][step];
-        values.forces.fill(0.0);
-        for (coordinate, samples) in self.forces {
-            values.forces[*coordinate] += sample(samples);
+        for (coordinate, samples) in &excitation.forces {
+            values.forces[*coordinate] = sample(samples);
         }
-        values.frames.fill(0.0);
-        for (coordinate, samples) in self.frames {
-            values.frames[*coordinate] += sample(samples);
+        for (coordinate, samples) in &excitation.frames {
+            values.frames[*coordinate] = sample(samples);
         }
-        for (s, support) in self.supports.iter().enumerate() {
-            values.supports[0][s] = sample(support.displacement);
-            values.supports[1][s] = sample(support.velocity);
-            values.supports[2][s] = sample(support.acceleration);
+        let [q, v, a] = &mut values.supports;
+        for (s, support) in excitation.supports.iter().enumerate() {
+            q[s] = sample(&support.displacement);
+            v[s] = sample(&support.velocity);
+            a[s] = sample(&support.acceleration);
         }
     }
 }
@@ -100,7 +87,7 @@ impl<'a> Motion<'a> {
             "values of each function"
         );
         assert_eq!(
-            self.supports.len(),
+            self.excitation.map_or(0, |e| e.supports.len()),
             self.structure.supports(),
             "a motion of each support"
         );
@@ -110,15 +97,9 @@ impl<'a> Motion<'a> {
     /// Largest stable step, s, by the linear springs and dampers with their largest coefficients and the least inertias; infinite for the
     /// implicit method. `None` where the mass matrix is not positive definite.
     pub fn largest_stable_step(&self) -> Option<f64> {
-        let inertias = self.structure.inertias().len();
-        let extremes = self.functions.iter().enumerate().map(|(f, values)| {
-            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            if f < inertias { least } else { largest }
-        });
         let rate = self
             .structure
-            .largest_rate(&extremes.collect::<Vec<f64>>())?;
+            .largest_rate_of(self.functions.iter().copied())?;
         Some(self.method.stability_limit() / rate)
     }
 
@@ -209,20 +190,37 @@ impl<'a> Motion<'a> {
         functions: &[&[f64]],
         initial: &[f64],
     ) -> Result<Trajectory, MotionError> {
+        let mut all = self.tangents(states, &[(functions, initial)])?;
+        Ok(all.remove(0))
+    }
+
+    /// [`Motion::tangent`] along several directions, which share the linearised steps.
+    pub(crate) fn tangents(
+        &self,
+        states: &Trajectory,
+        directions: &[(&[&[f64]], &[f64])],
+    ) -> Result<Vec<Trajectory>, MotionError> {
         let mut steps = self.steps();
-        let mut out = Trajectory::zeros(self.structure.coordinates(), states.nodes());
         let zeros = vec![0.0; states.components()];
-        let (mut x, mut next, mut change) = (zeros.clone(), zeros, initial.to_vec());
-        out.write(0, &change);
+        let (mut x, mut next) = (zeros.clone(), zeros);
+        let empty = Trajectory::zeros(states.coordinates(), states.nodes());
+        let begin = |(_, initial): &(_, &[f64])| {
+            let mut out = empty.clone();
+            out.write(0, initial);
+            (out, initial.to_vec())
+        };
+        let mut all: Vec<(Trajectory, Vec<f64>)> = directions.iter().map(begin).collect();
         for i in 0..states.nodes() - 1 {
             states.read(i, &mut x);
             states.read(i + 1, &mut next);
             (steps.linearise(self, i, &mut x, Some(&next)))
                 .map_err(|trouble| Self::error(i, trouble))?;
-            steps.push(&Changes(functions), i, &mut change);
-            out.write(i + 1, &change);
+            for ((out, change), (functions, _)) in all.iter_mut().zip(directions) {
+                steps.push(&Changes(functions), i, change);
+                out.write(i + 1, change);
+            }
         }
-        Ok(out)
+        Ok(all.into_iter().map(|(out, _)| out).collect())
     }
 
     /// The state after step `i` from the state `x`, and for each of its components the multipliers of the state before the step and the
@@ -264,6 +262,7 @@ fn add(at: At, shares: &[f64], to: &mut [[f64; 2]]) {
 }
 
 /// Derivatives of one component of the state after a step.
+#[derive(Debug, Clone)]
 pub(crate) struct StepRow {
     pub state: Vec<f64>,
     pub functions: Vec<[f64; 2]>,
@@ -272,7 +271,7 @@ pub(crate) struct StepRow {
 }
 
 impl StepRow {
-    fn zeros(structure: &Structure) -> Self {
+    pub fn zeros(structure: &Structure) -> Self {
         let n = structure.coordinates();
         Self {
             state: vec![0.0; 2 * n],

@@ -1,12 +1,12 @@
 //! Structures of any size: derivatives against dual numbers, responses against closed forms and the compiled sizes.
 
 use super::super::tableau::At;
+use super::Motion;
 use super::stage::{Scalar, StageValues};
 use super::step::{Source, Steps};
-use super::{Motion, SupportMotion};
 use crate::step::{Cause, Trajectory};
 use crate::structure::{Ends, Law, Structure, StructureError};
-use crate::system::{Method, StageSamples};
+use crate::system::{Excitation, Method, StageSamples, SupportMotion};
 use num_dual::Dual64;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,9 +35,7 @@ const LAWS: [Law; 8] = [
 struct Case {
     structure: Structure,
     functions: Vec<Vec<f64>>,
-    /// Forces, then frames, of each coordinate; displacements, velocities and accelerations of each support.
-    inputs: [Vec<StageSamples>; 2],
-    supports: Vec<[StageSamples; 3]>,
+    excitation: Excitation,
     initial: Vec<f64>,
     step: f64,
 }
@@ -92,13 +90,22 @@ impl Case {
                     .collect()
             })
             .collect();
-        let inputs = [0, 1].map(|_| (0..n).map(|_| samples(&mut random, nodes)).collect());
-        let motion = |random: &mut ChaCha8Rng| [0, 1, 2].map(|_| samples(random, nodes));
+        let mut each = || (0..n).map(|j| (j, samples(&mut random, nodes))).collect();
+        let (forces, frames) = (each(), each());
+        let motion = |random: &mut ChaCha8Rng| SupportMotion {
+            displacement: samples(random, nodes),
+            velocity: samples(random, nodes),
+            acceleration: samples(random, nodes),
+        };
+        let motions = (0..supports).map(|_| motion(&mut random)).collect();
         Self {
             structure: Structure::new(n, supports, inertias, elements).expect("a structure"),
             functions,
-            inputs,
-            supports: (0..supports).map(|_| motion(&mut random)).collect(),
+            excitation: Excitation {
+                forces,
+                frames,
+                supports: motions,
+            },
             initial: series(&mut random, 2 * n),
             step: 0.05,
         }
@@ -106,26 +113,12 @@ impl Case {
 
     fn with<T>(&self, method: Method, call: impl FnOnce(&Motion) -> T) -> T {
         let functions: Vec<&[f64]> = self.functions.iter().map(Vec::as_slice).collect();
-        let [forces, frames] = self.inputs.each_ref().map(|inputs| {
-            let each = inputs.iter().enumerate();
-            each.collect::<Vec<(usize, &StageSamples)>>()
-        });
-        let supports = self
-            .supports
-            .iter()
-            .map(|[displacement, velocity, acceleration]| SupportMotion {
-                displacement,
-                velocity,
-                acceleration,
-            });
         call(&Motion {
             structure: &self.structure,
             method,
             step: self.step,
             functions: &functions,
-            forces: &forces,
-            frames: &frames,
-            supports: &supports.collect::<Vec<_>>(),
+            excitation: Some(&self.excitation),
         })
     }
 }
@@ -338,9 +331,7 @@ fn responses_converge_to_modes_with_the_order_of_the_method() {
             method,
             step: h,
             functions: &functions,
-            forces: &[],
-            frames: &[],
-            supports: &[],
+            excitation: None,
         };
         let mut initial = vec![0.0; 2 * n];
         for (j, size) in modes {
@@ -397,9 +388,7 @@ fn the_largest_stable_step_is_the_limit() {
         method: Method::Rk4,
         step: f64::NAN,
         functions: &functions,
-        forces: &[],
-        frames: &[],
-        supports: &[],
+        excitation: None,
     };
     let limit = motion.largest_stable_step().expect("masses");
     // 2.5 over the highest frequency.
@@ -452,12 +441,15 @@ fn a_moving_support_is_a_moving_frame() {
             .map(|p| vec![p; nodes])
             .collect();
         let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-        let supports = [SupportMotion {
-            displacement: &displacement,
-            velocity: &velocity,
-            acceleration: &acceleration,
-        }];
-        let frames = [(0, &acceleration)];
+        let of_base = Excitation::one(None, Some(acceleration.clone()));
+        let of_support = Excitation {
+            supports: vec![SupportMotion {
+                displacement,
+                velocity,
+                acceleration,
+            }],
+            ..Excitation::default()
+        };
         let respond = |moves: bool, initial: [f64; 2]| {
             let ends = |moves: bool| {
                 if moves {
@@ -473,9 +465,7 @@ fn a_moving_support_is_a_moving_frame() {
                 method,
                 step: h,
                 functions: &functions,
-                forces: &[],
-                frames: if moves { &[] } else { &frames },
-                supports: if moves { &supports } else { &[] },
+                excitation: Some(if moves { &of_support } else { &of_base }),
             };
             let mut states = Trajectory::zeros(1, nodes);
             motion.respond(&initial, &mut states).expect("a motion");
@@ -562,9 +552,7 @@ fn what_cannot_be_computed_is_named() {
             method,
             step: 0.1,
             functions: &functions,
-            forces: &[],
-            frames: &[],
-            supports: &[],
+            excitation: None,
         };
         let mut states = Trajectory::zeros(2, 101);
         motion

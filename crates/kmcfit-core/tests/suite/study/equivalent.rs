@@ -41,7 +41,7 @@ fn response_from(initial: State, nodes: usize) -> TargetResponse {
     let fine = system(32 * (nodes - 1) + 1, Method::Rk4);
     let nodal = truth(&fine.grid);
     let excitation = force(&fine.grid);
-    let forces = excitation.force.as_ref().unwrap().at_nodes();
+    let forces = excitation.force(0).unwrap().at_nodes();
     let moved = fine.forward(&nodal, &initial, Some(&excitation)).unwrap();
     let pick = |f: &[f64]| -> Vec<f64> { f.iter().step_by(32).copied().collect() };
     let (y, v) = (moved.displacement(0), moved.velocity(0));

@@ -208,8 +208,8 @@ impl Measured {
     ) -> Self {
         let excitation = experiment.excitation.as_ref();
         let parts = [
-            excitation.and_then(|e| e.force.as_ref()),
-            excitation.and_then(|e| e.base.as_ref()),
+            excitation.and_then(|e| e.force(0)),
+            excitation.and_then(|e| e.frame(0)),
         ];
         let [force, base] = parts.map(|part| {
             let nodes = part.map(StageSamples::at_nodes);

@@ -3,7 +3,7 @@
 use crate::functions::Parameterization;
 use crate::problem::Problem;
 use crate::record::{Experiment, Measured, Measurements};
-use crate::solvers::reason::UnsupportedRecord;
+use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
 use std::sync::Arc;
 
 impl Measurements {
@@ -28,7 +28,10 @@ impl Measurements {
             if experiment.channels.is_empty() {
                 return Ok(None);
             }
-            let measured = Measured::of(problem, experiment, scalars);
+            let measured = match problem.system.structure.is_one() {
+                true => Measured::of(problem, experiment, scalars),
+                false => Err(MissingMeasurement::OneCoordinate),
+            };
             measured.map(Some).map_err(|reason| UnsupportedRecord {
                 experiment: index,
                 name: experiment.name.clone(),

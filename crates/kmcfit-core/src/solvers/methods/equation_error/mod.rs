@@ -37,6 +37,7 @@ use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
 use crate::solvers::timings::{Timings, timed};
 use crate::structure::Law;
+use crate::system::Excitation;
 use crate::system::NodalCoefficients;
 use crate::system::quadrature::trapezoid_weights;
 use equation::Equation;
@@ -272,8 +273,8 @@ fn equation_fixes_scale(problem: &Problem) -> bool {
         .iter()
         .filter(|e| !e.channels.is_empty());
     // The inertia force `-m b''` of the base scales with the mass.
-    let force = |e: &Experiment| e.excitation.as_ref().and_then(|e| e.force.clone());
-    fixed || measured.any(|e| force(e).is_some_and(|f| !f.is_zero()))
+    let is_forced = |e: &Excitation| e.forces.iter().any(|(_, force)| !force.is_zero());
+    fixed || measured.any(|e| e.excitation.as_ref().is_some_and(is_forced))
 }
 
 /// True if some equality determines the scale of `theta`: `a theta = b` with nonzero `b`. Inequalities only bound the scale.

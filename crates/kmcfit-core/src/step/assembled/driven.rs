@@ -1,35 +1,28 @@
-//! Systems of one coordinate as structures of any size: those of the methods that have no compiled steps.
+//! Systems whose steps are not compiled: several coordinates, supports, implicit methods.
 
 use super::super::engine::{Driven, Maps};
 use super::super::error::{SimulationError, at};
 use super::super::{CoefficientGradient, Trajectory};
+use super::sweeps::StepRow;
 use super::{Motion, MotionError};
 use crate::simd::LANES;
-use crate::system::{StageSamples, State};
+use crate::system::{State, SystemTangent};
 
 impl Driven<'_> {
-    fn with_motion<R>(self, call: impl FnOnce(&Motion) -> R) -> R {
-        // Functions of terms without coefficients are zero.
-        let zeros = vec![0.0; self.nodal.inertias[0].len()];
-        let given: Vec<&[f64]> = self.nodal.functions().collect();
-        let functions: Vec<&[f64]> = (0..=self.system.laws().len())
-            .map(|f| given.get(f).map_or(zeros.as_slice(), |values| values))
+    /// Functions of elements without coefficients are zero.
+    pub(in crate::step) fn with_motion<R>(self, call: impl FnOnce(&Motion) -> R) -> R {
+        let zeros = vec![0.0; self.nodal.nodes()];
+        let given = self.nodal.functions();
+        let functions: Vec<&[f64]> = given
+            .chain(std::iter::repeat(zeros.as_slice()))
+            .take(self.system.structure.functions())
             .collect();
-        let one = |part: fn(&crate::system::Excitation) -> &Option<StageSamples>| {
-            let samples = self
-                .excitation
-                .and_then(|excitation| part(excitation).as_ref());
-            samples.map(|samples| (0, samples))
-        };
-        let (force, base) = (one(|e| &e.force), one(|e| &e.base));
         call(&Motion {
             structure: &self.system.structure,
             method: self.system.method,
             step: self.system.grid.step(),
             functions: &functions,
-            forces: force.as_slice(),
-            frames: base.as_slice(),
-            supports: &[],
+            excitation: self.excitation,
         })
     }
 
@@ -54,8 +47,7 @@ impl Driven<'_> {
         source: &Trajectory,
         gradient: CoefficientGradient,
     ) -> State {
-        let nodes = self.nodal.inertias[0].len();
-        let mut all = vec![vec![0.0; nodes]; 1 + self.system.laws().len()];
+        let mut all = vec![vec![0.0; self.nodal.nodes()]; self.system.structure.functions()];
         let mut columns: Vec<&mut [f64]> = all.iter_mut().map(Vec::as_mut_slice).collect();
         let initial = self.with_motion(|motion| motion.adjoint(trajectory, source, &mut columns));
         match gradient {
@@ -70,8 +62,54 @@ impl Driven<'_> {
                 }
             }
         }
-        let initial = initial.unwrap_or_else(|_| vec![f64::NAN; 2]);
-        State::one(initial[0], initial[1])
+        State::from(initial.unwrap_or_else(|_| vec![f64::NAN; trajectory.components()]))
+    }
+
+    /// [`Driven::tangent`] along several directions, by the assembled structure.
+    pub(crate) fn tangents(
+        self,
+        trajectory: &Trajectory,
+        directions: &[SystemTangent],
+    ) -> Vec<Trajectory> {
+        let zeros = vec![0.0; self.nodal.nodes()];
+        let functions = directions.iter().map(|direction| {
+            let given = direction.nodal.functions();
+            let all = given.chain(std::iter::repeat(zeros.as_slice()));
+            all.take(self.system.structure.functions()).collect()
+        });
+        let functions: Vec<Vec<&[f64]>> = functions.collect();
+        let directions: Vec<(&[&[f64]], &[f64])> = (functions.iter().zip(directions))
+            .map(|(functions, direction)| (functions.as_slice(), direction.initial.components()))
+            .collect();
+        let found = self.with_motion(|motion| motion.tangents(trajectory, &directions));
+        found.unwrap_or_else(|_| {
+            let mut nothing = trajectory.clone();
+            for c in 0..nothing.components() {
+                nothing.component_mut(c).fill(f64::NAN);
+            }
+            vec![nothing; directions.len()]
+        })
+    }
+
+    /// Passes the state after each step and the rows of its derivatives to `take`; not a number where a step has no solution.
+    pub(in crate::step) fn each_assembled_step(
+        self,
+        trajectory: &Trajectory,
+        mut take: impl FnMut(&[f64], &[StepRow]),
+    ) {
+        let mut x = vec![0.0; trajectory.components()];
+        self.with_motion(|motion| {
+            for i in 0..trajectory.nodes() - 1 {
+                trajectory.read(i, &mut x);
+                match motion.step_derivatives(i, &mut x) {
+                    Ok(rows) => take(&x, &rows),
+                    Err(_) => {
+                        x.fill(f64::NAN);
+                        take(&x, &vec![StepRow::zeros(motion.structure); x.len()]);
+                    }
+                }
+            }
+        });
     }
 
     /// [`Driven::linearise`] by the assembled structure; not a number where a step has no solution.
