@@ -1,15 +1,15 @@
-//! Operations on a system: response, adjoint, tangents, and the linearisation of its steps. Explicit steps of one coordinate are compiled for
-//! common lists of elements; all others go through the assembled structure.
+//! Operations on a system: response, adjoint, tangents, and the linearisation of its steps. Explicit steps of up to three coordinates are
+//! compiled; all others go through the assembled structure.
 
 use super::adjoint::{Adjoint, Gradient};
-use super::error::{SimulationError, require_finite, require_positive_mass};
+use super::error::{SimulationError, require_finite, require_positive_masses};
 use super::maps::{Linearise, StepMaps, Wanted};
 use super::response::{Linear, Prepared, in_paper_order};
 use super::stage::{DUFFING, Drive, LINEAR, Model};
 use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{CoefficientGradient, Trajectory};
 use crate::simd;
-use crate::structure::{Law, Link, MOST_ELEMENTS};
+use crate::structure::{Law, Link, MOST_ELEMENTS, MOST_LINKS};
 use crate::system::{
     Excitation, FUNCTIONS, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
 };
@@ -51,41 +51,91 @@ pub struct Driven<'a> {
     pub excitation: Option<&'a Excitation>,
 }
 
-/// Evaluates an expression with the kernel's model of a [`Driven`] system, its common lists of elements known to the compiler.
+/// Calls a function of the kernel's model of a compiled [`Driven`] system with some links; the common lists of elements of one coordinate are
+/// known to the compiler.
 macro_rules! with_model {
-    ($driven:expr, $model:ident => $call:expr) => {{
-        let driven: Driven = $driven;
-        let mut list = [Link::grounded(Law::Offset); MOST_ELEMENTS];
-        let laws = driven.system.laws().iter();
-        let filled = list
-            .iter_mut()
-            .zip(laws)
-            .map(|(element, law)| element.law = *law)
-            .count();
-        match (driven.system.method, &list[..filled]) {
-            (Method::Midpoint, list) if list == LINEAR => {
-                let $model = driven.model::<2, 2>(&MIDPOINT, list);
-                $call
-            }
-            (Method::Rk4, list) if list == LINEAR => {
-                let $model = driven.model::<2, 4>(&RK4, list);
-                $call
-            }
-            (Method::Rk4, list) if list == DUFFING => {
-                let $model = driven.model::<3, 4>(&RK4, list);
-                $call
-            }
-            (Method::Midpoint, list) => {
-                let $model = driven.model::<MOST_ELEMENTS, 2>(&MIDPOINT, list);
-                $call
-            }
-            (Method::Rk4, list) => {
-                let $model = driven.model::<MOST_ELEMENTS, 4>(&RK4, list);
-                $call
-            }
-            (Method::ImplicitMidpoint, _) => unreachable!("an assembled structure"),
+    ($driven:expr, $links:expr, $call:ident($($argument:expr),*)) => {{
+        let (driven, links): (Driven, &[Link]) = ($driven, $links);
+        match (driven.system.structure.coordinates(), driven.system.method) {
+            (2, Method::Midpoint) => $call(driven.model::<2, MOST_LINKS, _>(&MIDPOINT, links), $($argument),*),
+            (2, _) => $call(driven.model::<2, MOST_LINKS, _>(&RK4, links), $($argument),*),
+            (3, Method::Midpoint) => $call(driven.model::<3, MOST_LINKS, _>(&MIDPOINT, links), $($argument),*),
+            (3, _) => $call(driven.model::<3, MOST_LINKS, _>(&RK4, links), $($argument),*),
+            _ => with_one_model!(driven, links, $call($($argument),*)),
         }
     }};
+}
+
+/// [`with_model`] of one coordinate.
+macro_rules! with_one_model {
+    ($driven:expr, $links:expr, $call:ident($($argument:expr),*)) => {{
+        let (driven, links): (Driven, &[Link]) = ($driven, $links);
+        match driven.system.method {
+            Method::Midpoint if links == LINEAR => $call(driven.model::<1, 2, _>(&MIDPOINT, links), $($argument),*),
+            Method::Midpoint => $call(driven.model::<1, MOST_ELEMENTS, _>(&MIDPOINT, links), $($argument),*),
+            _ if links == LINEAR => $call(driven.model::<1, 2, _>(&RK4, links), $($argument),*),
+            _ if links == DUFFING => $call(driven.model::<1, 3, _>(&RK4, links), $($argument),*),
+            _ => $call(driven.model::<1, MOST_ELEMENTS, _>(&RK4, links), $($argument),*),
+        }
+    }};
+}
+
+/// How a response is computed.
+#[derive(Clone, Copy)]
+enum Order {
+    Paper,
+    Linear,
+    Nonlinear,
+}
+
+/// Response of a compiled structure.
+fn respond_in<const N: usize, const E: usize, const S: usize>(
+    model: Model<N, E, S>,
+    initial: &State,
+    trajectory: &mut Trajectory,
+    order: Order,
+) {
+    let initial = initial.components();
+    let x = std::array::from_fn(|k| std::array::from_fn(|j| initial[k * N + j]));
+    let states = trajectory.columns_mut();
+    match order {
+        Order::Paper => in_paper_order(model, x, states),
+        Order::Linear => simd::run(Linear { model, x, states }),
+        Order::Nonlinear => simd::run(Prepared { model, x, states }),
+    }
+}
+
+/// Adjoint of a compiled structure.
+fn adjoint_in<const N: usize, const E: usize, const S: usize>(
+    model: Model<N, E, S>,
+    trajectory: &Trajectory,
+    source: &Trajectory,
+    gradient: Gradient,
+) -> State {
+    let slopes = simd::run(Adjoint {
+        model,
+        states: trajectory.columns(),
+        source: source.columns(),
+        gradient,
+    });
+    State::from(slopes.as_flattened().to_vec())
+}
+
+/// Linearised steps of one coordinate.
+fn linearise_in<const E: usize, const S: usize>(
+    model: Model<1, E, S>,
+    trajectory: &Trajectory,
+    from: usize,
+    wanted: &Wanted<FUNCTIONS>,
+    maps: &mut Maps,
+) {
+    simd::run(Linearise {
+        model,
+        states: trajectory.columns(),
+        from,
+        wanted,
+        maps,
+    });
 }
 
 impl<'a> Driven<'a> {
@@ -121,11 +171,11 @@ impl<'a> Driven<'a> {
         self
     }
 
-    fn model<'b, const E: usize, const S: usize>(
+    fn model<'b, const N: usize, const E: usize, const S: usize>(
         self,
         tableau: &'b Tableau<S>,
         list: &'b [Link],
-    ) -> Model<'b, 1, E, S>
+    ) -> Model<'b, N, E, S>
     where
         'a: 'b,
     {
@@ -137,21 +187,27 @@ impl<'a> Driven<'a> {
         Model {
             tableau,
             list,
-            masses: [&self.nodal.inertias[0]],
+            masses: std::array::from_fn(|j| self.nodal.inertias[j].as_slice()),
             coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
             drives: driven.map(|e| {
-                [Drive {
-                    force: stages(e.force(0)),
-                    base: stages(e.frame(0)),
-                }]
+                std::array::from_fn(|j| Drive {
+                    force: stages(e.force(j)),
+                    base: stages(e.frame(j)),
+                })
             }),
             dt: self.system.grid.step(),
         }
     }
 
-    /// True for steps that are not compiled: of several coordinates or supports, and implicit ones.
+    /// The elements of a structure whose steps are compiled: explicit ones of few coordinates.
+    fn links(self) -> Option<&'a [Link]> {
+        let links = self.system.structure.links();
+        links.filter(|_| self.system.method != Method::ImplicitMidpoint)
+    }
+
+    /// True where the linearised steps are not those of one coordinate that is compiled.
     pub(crate) fn is_assembled(self) -> bool {
-        self.system.is_assembled()
+        self.links().is_none() || self.system.structure.coordinates() > 1
     }
 
     /// Response from `initial` over the nodes of `trajectory`; a record may be shorter than the grid.
@@ -166,22 +222,17 @@ impl<'a> Driven<'a> {
     ) -> Result<(), SimulationError> {
         let grid = &self.system.grid;
         let nodes = trajectory.nodes();
-        if self.nodal.inertias.len() == 1 {
-            require_positive_mass(grid, self.nodal)?;
-        }
-        if self.is_assembled() {
-            return self.require(nodes).respond_assembled(initial, trajectory);
-        }
-        let in_order = mode.is_in_paper_order(self.system, self.excitation, nodes);
-        let is_linear = self.system.laws().iter().all(|law| law.is_linear());
-        let x = [[initial.displacement(0)], [initial.velocity(0)]];
         let driven = self.require(nodes);
-        let states = trajectory.columns_mut();
-        with_model!(driven, model => match (in_order, is_linear) {
-            (true, _) => in_paper_order(model, x, states),
-            (false, true) => simd::run(Linear { model, x, states }),
-            (false, false) => simd::run(Prepared { model, x, states }),
-        });
+        let Some(links) = self.links() else {
+            return driven.respond_assembled(initial, trajectory);
+        };
+        require_positive_masses(grid, self.nodal)?;
+        let order = match self.system.structure.is_linear() {
+            _ if mode.is_in_paper_order(self.system, self.excitation, nodes) => Order::Paper,
+            true => Order::Linear,
+            false => Order::Nonlinear,
+        };
+        with_model!(driven, links, respond_in(initial, trajectory, order));
         require_finite(grid, trajectory)
     }
 
@@ -196,21 +247,16 @@ impl<'a> Driven<'a> {
         gradient: CoefficientGradient,
     ) -> State {
         let driven = self.require(trajectory.nodes());
-        if self.is_assembled() {
+        let Some(links) = self.links() else {
             return driven.adjoint_assembled(trajectory, source, gradient);
-        }
+        };
         let gradient = match gradient {
             CoefficientGradient::AtNodes(nodal) => {
                 Gradient::AtNodes(nodal.functions_mut().map(Vec::as_mut_slice).collect())
             }
             CoefficientGradient::Summed(sums) => Gradient::Summed(sums),
         };
-        let states = [[trajectory.displacement(0)], [trajectory.velocity(0)]];
-        let source = [[source.displacement(0)], [source.velocity(0)]];
-        let [[displacement], [velocity]] = with_model!(driven, model => {
-            simd::run(Adjoint { model, states, source, gradient })
-        });
-        State::one(displacement, velocity)
+        with_model!(driven, links, adjoint_in(trajectory, source, gradient))
     }
 
     /// [`Driven::adjoint`] with the derivatives at the nodes.
@@ -232,13 +278,10 @@ impl<'a> Driven<'a> {
         wanted: &Wanted<FUNCTIONS>,
         maps: &mut Maps,
     ) {
-        let states = [[trajectory.displacement(0)], [trajectory.velocity(0)]];
-        if self.is_assembled() {
+        let Some(links) = self.links() else {
             return self.linearise_assembled(trajectory, from, maps);
-        }
-        with_model!(self, model => {
-            simd::run(Linearise { model, states, from, wanted, maps });
-        });
+        };
+        with_one_model!(self, links, linearise_in(trajectory, from, wanted, maps));
     }
 
     /// Directional derivative of the response along `direction`; not a number where a step has no solution.

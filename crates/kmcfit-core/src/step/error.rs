@@ -55,19 +55,18 @@ impl SimulationError {
     }
 }
 
-/// Error if the mass is not positive at some node.
-pub(super) fn require_positive_mass(
+/// Error if a mass is not positive at some node.
+pub(super) fn require_positive_masses(
     grid: &Grid,
     nodal: &NodalCoefficients,
 ) -> Result<(), SimulationError> {
-    if are_positive(&nodal.inertias[0]) {
-        return Ok(());
+    for mass in nodal.inertias.iter().filter(|mass| !are_positive(mass)) {
+        let broken = |m: &f64| m.is_nan() || *m <= 0.0;
+        if let Some(node) = mass.iter().position(broken) {
+            return Err(at(grid, Cause::Mass, node, mass[node]));
+        }
     }
-    let broken = |m: &f64| m.is_nan() || *m <= 0.0;
-    match nodal.inertias[0].iter().position(broken) {
-        Some(node) => Err(at(grid, Cause::Mass, node, nodal.inertias[0][node])),
-        None => Ok(()),
-    }
+    Ok(())
 }
 
 /// Error if the response is not finite.

@@ -68,10 +68,15 @@ impl Trajectory {
         &mut self.columns[c * self.nodes..(c + 1) * self.nodes]
     }
 
-    /// Displacements and velocities of `N` coordinates.
+    /// [`Trajectory::columns`], mutable.
     pub(super) fn columns_mut<const N: usize>(&mut self) -> [[&mut [f64]; N]; 2] {
         let mut columns = self.columns.chunks_exact_mut(self.nodes);
         std::array::from_fn(|_| std::array::from_fn(|_| columns.next().unwrap_or_default()))
+    }
+
+    /// Displacements and velocities of `N` coordinates.
+    pub(super) fn columns<const N: usize>(&self) -> [[&[f64]; N]; 2] {
+        std::array::from_fn(|k| std::array::from_fn(|j| self.component(k * N + j)))
     }
 
     /// Displacement of a coordinate, m.

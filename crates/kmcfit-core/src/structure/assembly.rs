@@ -1,9 +1,14 @@
 //! A structure as one table of inertias and elements.
 
 use super::banded::Banded;
-use super::{Ends, Law, MOST_ELEMENTS};
+use super::{Ends, Law, Link, MOST_ELEMENTS};
 use nalgebra::DMatrix;
 use thiserror::Error;
+
+/// Largest number of coordinates of a structure whose steps are compiled.
+const MOST_COMPILED: usize = 3;
+/// Largest number of elements of one with several coordinates.
+pub(crate) const MOST_LINKS: usize = 12;
 
 /// A structure of any number of coordinates:
 ///
@@ -24,7 +29,9 @@ pub struct Structure {
     /// Places in a banded matrix, and values there, of `b b^T` for the row of each function.
     patterns: Vec<Vec<(usize, f64)>>,
     bandwidth: usize,
-    is_one: bool,
+    /// Elements of a structure whose steps are compiled: of up to three coordinates with a mass each, without supports, with elements between
+    /// two coordinates or a coordinate and the ground.
+    links: Option<Vec<Link>>,
 }
 
 /// A structure that cannot be made.
@@ -116,21 +123,19 @@ impl Structure {
             ends,
             patterns,
             bandwidth,
-            is_one: false,
+            links: None,
         }
-        .with_size())
+        .with_links())
     }
 
-    /// The structure that knows whether it is one coordinate.
-    fn with_size(mut self) -> Self {
-        let ground = Ends::ground(0);
-        self.is_one = (self.coordinates, self.supports, self.inertias.len()) == (1, 0, 1)
-            && self
-                .inertias
-                .iter()
-                .chain(&self.ends)
-                .all(|ends| *ends == ground)
-            && self.laws.len() <= MOST_ELEMENTS;
+    fn with_links(mut self) -> Self {
+        let n = self.coordinates;
+        let masses = (0..n).map(Ends::ground);
+        let is_small = n <= MOST_COMPILED && self.supports == 0 && masses.eq(self.inertias.clone());
+        let most = if n == 1 { MOST_ELEMENTS } else { MOST_LINKS };
+        let links = self.elements().map(|(law, ends)| ends.link(law));
+        let links: Option<Vec<Link>> = links.collect();
+        self.links = links.filter(|links| is_small && links.len() <= most);
         self
     }
 
@@ -144,8 +149,9 @@ impl Structure {
             patterns: vec![vec![(0, 1.0)]; 1 + laws.len()],
             laws,
             bandwidth: 0,
-            is_one: true,
+            links: None,
         }
+        .with_links()
     }
 
     /// Adds elements between the first coordinate and the ground.
@@ -155,6 +161,7 @@ impl Structure {
             self.ends.push(Ends::ground(0));
             self.patterns.push(vec![(0, 1.0)]);
         }
+        *self = self.clone().with_links();
     }
 
     /// Sets the width of Coulomb friction, m/s.
@@ -164,6 +171,7 @@ impl Structure {
                 *of_law = width;
             }
         }
+        *self = self.clone().with_links();
     }
 
     /// Number of coordinates.
@@ -171,9 +179,14 @@ impl Structure {
         self.coordinates
     }
 
-    /// True for one coordinate with its mass, and at most one element of each law between it and the ground.
+    /// True for one coordinate with its mass, and some elements between it and the ground.
     pub fn is_one(&self) -> bool {
-        self.is_one
+        self.coordinates == 1 && self.links.is_some()
+    }
+
+    /// Elements of a structure whose steps are compiled.
+    pub(crate) fn links(&self) -> Option<&[Link]> {
+        self.links.as_deref()
     }
 
     /// Number of supports, whose indices follow those of the coordinates.

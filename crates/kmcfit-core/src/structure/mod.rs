@@ -14,6 +14,7 @@ mod ends;
 mod law;
 mod link;
 
+pub(crate) use assembly::MOST_LINKS;
 pub use assembly::{Structure, StructureError};
 pub use ends::Ends;
 pub use law::{Law, MOST_ELEMENTS};

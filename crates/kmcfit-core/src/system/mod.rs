@@ -38,11 +38,6 @@ impl System {
         self.structure.laws()
     }
 
-    /// True where steps go through the assembled structure: all but explicit steps of one coordinate.
-    pub(crate) fn is_assembled(&self) -> bool {
-        !self.structure.is_one() || self.method == Method::ImplicitMidpoint
-    }
-
     /// Width of Coulomb friction, m/s; `None` without it.
     pub fn friction_width(&self) -> Option<f64> {
         self.laws().iter().find_map(Law::friction_width)
