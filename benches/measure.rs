@@ -6,7 +6,7 @@
 //! measure triad                     memory bandwidth of one core, bytes/s
 //! measure evaluation NODES SECONDS  cost and discrete gradient of the paper's problem
 //! measure starts STARTS THREADS     a study of so many starts of models/knots.yaml
-//! measure chain COORDINATES NODES   response, and its adjoint, of a chain of masses by the implicit midpoint rule
+//! measure chain COORDINATES NODES METHOD   response, and its adjoint, of a chain of masses: midpoint, rk4 or implicit-midpoint
 //! ```
 
 mod common;
@@ -16,8 +16,12 @@ mod common;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::internals::step::{Driven, EngineMode};
 use kmcfit_core::internals::study::multistart::multistart;
-use kmcfit_core::{Ends, Excitation, Law, Method, Motion, StageSamples, Structure, Trajectory};
+use kmcfit_core::{
+    Ends, Excitation, Grid, Law, Method, NodalCoefficients, StageSamples, State, Structure, System,
+    Trajectory,
+};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -36,7 +40,9 @@ fn main() {
         ["triad"] => triad(),
         ["evaluation", nodes, seconds] => evaluation(number(nodes), number(seconds)),
         ["starts", starts, threads] => study(number(starts), number(threads)),
-        ["chain", coordinates, nodes] => chain_of_masses(number(coordinates), number(nodes)),
+        ["chain", coordinates, nodes, method] => {
+            chain_of_masses(number(coordinates), number(nodes), method);
+        }
         // `cargo bench` and `cargo test --benches` call every benchmark without such words.
         _ => println!("measure: see benches/race.py"),
     }
@@ -163,8 +169,8 @@ fn repeated(seconds: f64, mut call: impl FnMut()) -> f64 {
     median(&mut times)
 }
 
-/// Times of the response, and of response and adjoint, of a chain of masses, springs and dampers with a force at its end.
-fn chain_of_masses(n: usize, nodes: usize) {
+/// Times of the response, and of response and nodal gradient, of a chain of masses, springs and dampers with a force at its end.
+fn chain_of_masses(n: usize, nodes: usize, method: &str) {
     let ends = |j: usize| match j {
         0 => Ends::ground(0),
         _ => Ends::between(j, j - 1),
@@ -172,43 +178,41 @@ fn chain_of_masses(n: usize, nodes: usize) {
     let elements = (0..n).flat_map(|j| [(Law::Damping, ends(j)), (Law::Stiffness, ends(j))]);
     let structure = Structure::new(n, 0, (0..n).map(Ends::ground).collect(), elements.collect())
         .expect("a chain");
-    let level = |f: usize| match f.checked_sub(n) {
-        None => 1.0,
-        Some(e) => [0.3, 40.0][e % 2],
+    let methods = [Method::Midpoint, Method::Rk4, Method::ImplicitMidpoint];
+    let method = methods.into_iter().find(|m| m.name() == method);
+    let system = System {
+        grid: Grid::new(0.0, 0.0125 * (nodes - 1) as f64, nodes).expect("a grid"),
+        method: method.expect("a method"),
+        structure,
     };
-    let values: Vec<Vec<f64>> = (0..3 * n).map(|f| vec![level(f); nodes]).collect();
-    let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let constant = |level: f64| vec![level; nodes];
+    let nodal = NodalCoefficients {
+        inertias: vec![constant(1.0); n],
+        coefficients: (0..2 * n).map(|e| constant([0.3, 40.0][e % 2])).collect(),
+    };
     let force: Vec<f64> = (0..nodes).map(|i| (0.07 * i as f64).sin()).collect();
     let excitation = Excitation {
         forces: vec![(n - 1, StageSamples::linear(&force))],
         ..Excitation::default()
     };
-    let motion = Motion {
-        structure: &structure,
-        method: Method::ImplicitMidpoint,
-        step: 0.02,
-        functions: &functions,
+    let driven = Driven {
+        system: &system,
+        nodal: &nodal,
         excitation: Some(&excitation),
     };
-    let initial = vec![0.0; 2 * n];
+    let initial = State::rest(n);
     let mut states = Trajectory::zeros(n, nodes);
-    let forward = repeated(0.5, || {
-        motion
-            .respond(black_box(&initial), &mut states)
-            .expect("a motion");
-    });
+    let mut respond = || {
+        let found = driven.respond(EngineMode::Fastest, black_box(&initial), &mut states);
+        found.expect("a motion");
+    };
+    let forward = repeated(0.5, &mut respond);
+    respond();
     let source = states.clone();
-    let mut gradient = values.clone();
     let both = repeated(0.5, || {
-        motion
-            .respond(black_box(&initial), &mut states)
-            .expect("a motion");
-        let mut columns: Vec<&mut [f64]> = gradient.iter_mut().map(Vec::as_mut_slice).collect();
-        black_box(
-            motion
-                .adjoint(&states, &source, &mut columns)
-                .expect("an adjoint"),
-        );
+        let found = driven.respond(EngineMode::Fastest, black_box(&initial), &mut states);
+        found.expect("a motion");
+        black_box(driven.nodal_adjoint(&states, &source));
     });
     println!(
         "{{\"coordinates\": {n}, \"nodes\": {nodes}, \"forward_seconds\": {forward:.6e}, \"seconds\": {both:.6e}}}"
