@@ -36,6 +36,7 @@ mod statistics;
 mod step_check;
 mod variation;
 mod verdict;
+mod warning;
 
 pub use crate::objective::{all_diagnostics, outliers};
 pub use assumptions::{VerdictAssumption, verdict_assumptions};
@@ -48,7 +49,7 @@ pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
 pub use large_covariance::LargeCovariance;
 pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
-pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
+pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility, Unidentified};
 pub use record_error::RecordError;
 pub use recovery::{RECOVERY_TOLERANCE, TruthErrors};
 pub use refinement::{BasisTest, CoarseBasis};
@@ -56,6 +57,7 @@ pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome};
 pub use verdict::{SampleFault, VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
+pub use warning::FitWarning;
 
 use classical::classical_estimate;
 use friction_width::width_warning;

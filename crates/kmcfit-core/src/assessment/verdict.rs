@@ -4,9 +4,10 @@
 //! noise model, the time steps, the bases, missing force terms, the inputs, and what the samples identify.
 
 use super::FitAssessment;
+use super::FitWarning;
 use super::classical::ClassicalEstimate;
 use super::implausible::Implausible;
-use super::plausibility::{FitWarning, Unidentified};
+use super::plausibility::Unidentified;
 use super::record_error::RecordError;
 use super::rivals::AmplitudeRival;
 use crate::identifiability::{

@@ -9,8 +9,10 @@ mod clarabel;
 mod contradiction;
 mod dot2;
 mod dual_active_set;
+mod equalities;
 mod few_variables;
 mod kkt;
+mod layout;
 mod ldl;
 mod polish;
 mod primal_dual;
@@ -22,8 +24,9 @@ mod subproblem;
 
 pub use chain::BandedFactor;
 pub use kkt::Kkt;
+pub use layout::{ResponseVariables, StageLayout};
 pub use primal_dual::PrimalDual;
 pub use projection::{project, project_within};
 pub use solve::{ConicStatus, Solution};
-pub use stages::{ResponseVariables, StageLayout};
+
 pub use subproblem::Subproblem;

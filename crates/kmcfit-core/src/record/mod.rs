@@ -12,6 +12,7 @@ mod noise;
 mod sample_places;
 mod sensor;
 mod weighting;
+mod whitening;
 
 pub use channel::Channel;
 pub use experiment::Experiment;
@@ -22,9 +23,10 @@ pub use loss::Loss;
 pub use measured::Measurements;
 pub(crate) use measured::{Differences, Measured, Unsmoothed};
 pub use misfit::integral_over;
-pub use noise::{Majorant, NoiseEstimate, NoiseModel, ScoreCovariance};
+pub use noise::{NoiseEstimate, NoiseModel, ScoreCovariance};
 pub use sensor::Sensor;
 pub use weighting::Weighting;
+pub use whitening::Majorant;
 
 /// Number of steps from which a record is processed in parts.
 pub(crate) const LONG_RECORD_STEPS: usize = 1 << 15;

@@ -6,7 +6,6 @@ mod bounds;
 mod cones;
 mod hessian;
 mod interior_point;
-mod layout;
 mod riccati;
 mod rows;
 mod sizes;
@@ -16,10 +15,8 @@ mod transitions;
 #[cfg(test)]
 mod tests;
 
-pub use layout::{ResponseVariables, StageLayout};
-
 use super::dot2::{CompensatedSum, add_transposed_product, residuals};
-use super::{PrimalDual, Subproblem};
+use super::{PrimalDual, StageLayout, Subproblem};
 use sizes::Sizes;
 use transcription::StageProgram;
 

@@ -1,8 +1,8 @@
 //! Numbers of states and controls of a subproblem, and the stage of each of its rows.
 
-use super::layout::{Place, StageLayout};
 use crate::constraints::{Cone, Rows};
 use crate::qp::Subproblem;
+use crate::qp::layout::{Place, StageLayout};
 
 /// Highest difference of a coefficient in the state.
 const HIGHEST_ORDER: usize = 3;

@@ -2,9 +2,9 @@
 //! against the lower bound of the cost by its own multipliers.
 
 use super::super::PrimalDual;
-use super::{ResponseVariables, StageLayout};
 use crate::constraints::{Cone, Rows};
 use crate::qp::{ConicStatus, Kkt, Subproblem};
+use crate::qp::{ResponseVariables, StageLayout};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,11 +1,11 @@
 //! A subproblem as a control problem along time.
 
-use super::layout::{Place, StageLayout};
 use super::rows::{LooseRows, StageRows};
 use super::sizes::{Sizes, stage_of, stage_of_cone};
 use super::transitions::{NONE, Transitions};
 use crate::constraints::{Rows, TOLERANCE};
 use crate::qp::Subproblem;
+use crate::qp::layout::{Place, StageLayout};
 use crate::simd::tall_qr::order_by;
 
 /// The side of an inequality that a constraint row stands for.
