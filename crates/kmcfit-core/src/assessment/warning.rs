@@ -1,0 +1,156 @@
+//! Warnings about a fit.
+
+use super::classical::ClassicalEstimate;
+use super::record_error::RecordError;
+use super::refinement::CoarseBasis;
+use super::rivals::AmplitudeRival;
+use crate::record::ScoreCovariance;
+use crate::solvers::MissingTerm;
+use crate::system::InputQuantity;
+use serde::Serialize;
+
+/// A warning about a fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum FitWarning {
+    /// The residuals are a multiple of sigma: standard errors are unknown.
+    BeyondSigma {
+        /// Residuals of the worst channel over its sigma.
+        times: f64,
+    },
+    /// Halving the step changes the response by a multiple of the residuals: standard errors are unknown.
+    CoarseSteps {
+        /// Change relative to the root-mean-square residual.
+        times: f64,
+    },
+    /// The residuals are large and not white: standard errors are unknown.
+    PoorFit,
+    /// The residuals are not white, beyond the noise model.
+    Coloured {
+        /// Covariance of the intervals: that of the model gives standard errors that are too small.
+        covariance: ScoreCovariance,
+    },
+    /// The noise of a channel is estimated as correlated, and the intervals account for it.
+    Correlated,
+    /// Systems of other frequencies match equally spaced samples as well: standard errors are unknown.
+    Aliased {
+        /// Samples per period.
+        per_period: f64,
+        /// Identified natural frequency, Hz.
+        frequency: f64,
+    },
+    /// A finer basis fits significantly better: the intervals exclude the error of the basis.
+    CoarseBasis(CoarseBasis),
+    /// Functions can vary within the periods of the vibration, which cannot be told from offsets, harmonics and second modes.
+    FastVariation {
+        /// Names of the functions.
+        functions: Vec<String>,
+        /// Most parameters per period.
+        per_period: f64,
+    },
+    /// A function oscillates, as the sum of two modes that beat makes it.
+    Oscillates {
+        /// Name of the function.
+        function: String,
+        /// Frequency of the oscillation, Hz.
+        frequency: f64,
+    },
+    /// The interpolation between the samples of an input loses a share of it, which the coefficients have lost as well.
+    InterpolationLoss {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+        /// Share lost at the natural frequency.
+        share: f64,
+        /// Largest shift of an estimate by cubics in place of the lines, in standard errors.
+        errors: f64,
+    },
+    /// The residuals are those of errors of a measured input, or of a term missing from the equation of motion.
+    DisturbedInput {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+        /// Sigma of errors of the input that leave such residuals, in its SI unit.
+        sigma: f64,
+        /// The same relative to the input, root mean square.
+        share: f64,
+    },
+    /// The innovations of a channel are coherent with a measured input: dynamics are missing from the model.
+    CoherentResiduals {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+        /// The input.
+        input: InputQuantity,
+        /// Share of their variance.
+        share: f64,
+    },
+    /// The residuals contradict the stated sigma of an input.
+    ContradictedInputSigma {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+        /// Stated sigma, in the SI unit of the input.
+        given: f64,
+        /// Sigma of the largest likelihood, in the SI unit of the input.
+        likely: f64,
+    },
+    /// The residuals of the equation of motion show a term that the model does not have.
+    MissingTerm(MissingTerm),
+    /// Constants and terms that depend on the amplitude explain the samples as well as functions that vary with time.
+    TimeOrAmplitude(AmplitudeRival),
+    /// Two modes explain the samples of a record.
+    SecondMode {
+        /// Name of the experiment.
+        experiment: String,
+        /// Their natural frequencies, Hz, the stronger first.
+        frequencies: [f64; 2],
+    },
+    /// The residuals of a channel have a mean: an offset of its sensor, or a static force.
+    ResidualMean {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+        /// Mean of samples less predictions, in the SI unit of the channel.
+        mean: f64,
+        /// Mean over its standard error, which allows for autocorrelation.
+        t: f64,
+        /// Mean over the standard deviation of the residuals.
+        share: f64,
+        /// True if a static force has the same effect: the channel is a displacement, and no static force is estimated.
+        or_static_force: bool,
+    },
+    /// Half the width of Coulomb friction shifts an estimate by more than half a standard error.
+    FrictionWidth {
+        /// Name of the estimate with the largest shift.
+        estimate: String,
+        /// Its shift, in its unit; `None` for a function with several parameters.
+        shift: Option<f64>,
+        /// Unit of the shift.
+        unit: String,
+        /// The shift in standard errors.
+        errors: f64,
+        /// Width, m/s.
+        width: f64,
+    },
+    /// A function is negative at most times, which violates passivity.
+    Negative {
+        /// Name of the function.
+        function: String,
+    },
+    /// The measured force is negligible beside the inertia force of the system.
+    NegligibleForce {
+        /// Name of the experiment.
+        experiment: String,
+    },
+    /// A classical estimate and that of the fit differ by more than their intervals.
+    ClassicalDisagrees(ClassicalEstimate),
+    /// An error of a record explains the residuals.
+    #[serde(untagged)]
+    RecordError(RecordError),
+}
