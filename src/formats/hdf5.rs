@@ -4,14 +4,16 @@
 //! that were never written are missing samples, and what the file states of counts (`scale_factor`, `add_offset`, `_FillValue`) is
 //! applied.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use hdf5_pure::{AttrValue, Dataset, File, Group, Layout, Object};
 
 use super::array::Array;
 use super::budget::{Budget, damaged};
-use super::hdf5_fields::{fields, is_text, numbers, statements};
+use super::hdf5_fields::{
+    Attributes, Unread, content, fields, is_text, numbers, one_line, statements,
+};
 use super::hdf5_guards::{Missing, remove_soft_links};
 use super::{Channels, Format, mat_class, refused};
 use crate::error::InputError;
@@ -59,34 +61,6 @@ struct Reader<'a, 'b> {
     budget: &'b mut Budget<'a>,
     channels: Channels,
 }
-
-/// Why a data set is not read.
-pub(super) enum Unread {
-    /// Content, as a noun, and remedy.
-    Content(String, Option<&'static str>),
-    /// A structure that the library does not read, or damage.
-    Library(String),
-    /// The file as a whole is refused.
-    File(InputError),
-}
-
-impl From<hdf5_pure::Error> for Unread {
-    fn from(error: hdf5_pure::Error) -> Self {
-        Self::Library(one_line(&error))
-    }
-}
-
-impl From<InputError> for Unread {
-    fn from(error: InputError) -> Self {
-        Self::File(error)
-    }
-}
-
-pub(super) fn content(noun: &str, hint: Option<&'static str>) -> Unread {
-    Unread::Content(noun.to_owned(), hint)
-}
-
-pub(super) type Attributes = HashMap<String, AttrValue>;
 
 /// What MATLAB says of a variable.
 struct Class<'a> {
@@ -385,10 +359,6 @@ fn listed(group: &Group) -> Result<Vec<(String, Object)>, hdf5_pure::Error> {
     let mut members: Vec<_> = sets.chain(groups).collect();
     members.sort_by(|(a, _), (b, _)| a.cmp(b));
     Ok(members)
-}
-
-fn one_line(error: &hdf5_pure::Error) -> String {
-    error.to_string().replace('\n', " ")
 }
 
 /// Dotted path of a member of a group.

@@ -2,8 +2,41 @@
 
 use hdf5_pure::{AttrValue, Datatype};
 
-use super::hdf5::{Attributes, Unread, content};
 use super::hdf5_number::Number;
+use crate::error::InputError;
+use std::collections::HashMap;
+
+/// Why a data set is not read.
+pub(super) enum Unread {
+    /// Content, as a noun, and remedy.
+    Content(String, Option<&'static str>),
+    /// A structure that the library does not read, or damage.
+    Library(String),
+    /// The file as a whole is refused.
+    File(InputError),
+}
+
+impl From<hdf5_pure::Error> for Unread {
+    fn from(error: hdf5_pure::Error) -> Self {
+        Self::Library(one_line(&error))
+    }
+}
+
+impl From<InputError> for Unread {
+    fn from(error: InputError) -> Self {
+        Self::File(error)
+    }
+}
+
+pub(super) fn content(noun: &str, hint: Option<&'static str>) -> Unread {
+    Unread::Content(noun.to_owned(), hint)
+}
+
+pub(super) fn one_line(error: &hdf5_pure::Error) -> String {
+    error.to_string().replace('\n', " ")
+}
+
+pub(super) type Attributes = HashMap<String, AttrValue>;
 
 /// Most numbers of a field.
 const WIDEST: u32 = 1000;

@@ -7,6 +7,7 @@ mod array;
 mod budget;
 mod bytes;
 mod clocks;
+mod format;
 mod hdf5;
 mod hdf5_fields;
 mod hdf5_guards;
@@ -35,8 +36,9 @@ use std::path::Path;
 
 use budget::Budget;
 pub(crate) use clocks::{align, own_times};
+pub use format::Format;
 pub(crate) use names::{Meaning, letters, meaning};
-pub use recognise::{DATA_EXTENSIONS, Format, has_data_extension, recognise};
+pub use recognise::{DATA_EXTENSIONS, has_data_extension, recognise};
 pub use sampling::Sampling;
 pub(crate) use stated::{Fact, Subject};
 pub(crate) use zip::unpacked;
