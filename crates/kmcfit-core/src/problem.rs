@@ -65,14 +65,16 @@ pub enum ProblemError {
         /// Nodes of the grid.
         grid: usize,
     },
-    /// A coefficient set does not have one function for each inertia and one for each element.
-    #[error("{inertias} inertias and {elements} elements need one function each; found {found}")]
+    /// A coefficient set does not have one function for each inertia and each coefficient of the elements.
+    #[error(
+        "{inertias} inertias and {elements} coefficients need one function each; found {found}"
+    )]
     Functions {
         /// Number of functions.
         found: usize,
         /// Number of inertias.
         inertias: usize,
-        /// Number of elements.
+        /// Number of coefficients of the elements.
         elements: usize,
     },
     /// A record does not fit the grid or the functions.
@@ -115,7 +117,8 @@ impl ProblemParts {
             return Err(ProblemError::Nodes { functions, grid });
         }
         let structure = &self.system.structure;
-        let (inertias, elements) = (structure.inertias().len(), structure.laws().len());
+        let inertias = structure.inertias().len();
+        let elements = structure.functions() - inertias;
         for set in self.functions.coefficient_sets() {
             let found = set.len();
             if (set.inertias(), found) != (inertias, inertias + elements) {
@@ -173,7 +176,7 @@ impl ProblemParts {
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
         let structure = &self.system.structure;
-        let components = 2 * structure.coordinates();
+        let components = structure.components();
         let has_state = [
             record.initial.components().len(),
             record.initial_parameters.len(),

@@ -187,7 +187,7 @@ impl Problem {
         scalars: &mut [f64],
     ) -> Trajectory {
         let (experiment, view) = (&self.experiments[e], self.view(evaluation, e));
-        let mut source = Trajectory::zeros(view.response.coordinates(), experiment.nodes);
+        let mut source = Trajectory::like(view.response);
         for (c, channel) in experiment.channels.iter().enumerate() {
             channel.add_transpose(view, &slopes(e, c), &mut source, direct, scalars);
         }

@@ -59,7 +59,6 @@ impl Problem {
     /// Storage for evaluations by [`Problem::evaluate_into`].
     pub fn workspace(&self) -> Evaluation {
         let nodal_sets = self.functions.coefficient_sets().len();
-        let coordinates = self.system.structure.coordinates();
         Evaluation {
             cost: f64::NAN,
             misfit: f64::NAN,
@@ -68,7 +67,7 @@ impl Problem {
             own_nodal: vec![self.functions.empty_nodal(); nodal_sets - 1],
             scalars: vec![0.0; self.functions.scalars().len()],
             trajectories: (self.experiments.iter())
-                .map(|e| Trajectory::zeros(coordinates, e.nodes))
+                .map(|e| Trajectory::of(&self.system.structure, e.nodes))
                 .collect(),
             predictions: (self.experiments.iter())
                 .map(|e| vec![Vec::new(); e.channels.len()])
@@ -220,7 +219,7 @@ impl Problem {
         let initial = initial.map(|estimated| estimated.map_or(0.0, |i| scalars[i]));
         SystemTangent {
             nodal: self.functions.direction(along, experiment.coefficient_set),
-            initial: State::from(initial.collect::<Vec<f64>>()),
+            initial: State::of_components(experiment.initial.coordinates(), initial.collect()),
         }
     }
 

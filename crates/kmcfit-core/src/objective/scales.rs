@@ -52,7 +52,8 @@ impl Problem {
                 response if response > 0.0 => inertia / response,
                 _ => 0.0,
             };
-            let natural = (masses.iter().copied()).chain((0..structure.laws().len()).map(natural));
+            let coefficients = structure.functions() - masses.len();
+            let natural = (masses.iter().copied()).chain((0..coefficients).map(natural));
             let own = nodal.functions().map(size_of);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
@@ -124,14 +125,21 @@ fn squares_of_structure(response: &Trajectory, structure: &Structure, step: f64)
             across(ends, &|j| curvature_at(response.displacement(j), step, i))
         })
     };
-    let element = |(law, ends): (Law, &Ends)| {
-        sum_of_squares(response.nodes(), |i| {
-            let x = across(ends, &|j| response.displacement(j)[i]);
-            law.phi(x, across(ends, &|j| response.velocity(j)[i]))
-        })
-    };
-    let inertias = structure.inertias().iter().map(inertia);
-    inertias.chain(structure.elements().map(element)).collect()
+    let mut squares: Vec<f64> = structure.inertias().iter().map(inertia).collect();
+    let mut internal = 2 * n..;
+    for (law, ends) in structure.elements() {
+        let state = law.has_internal_state().then(|| internal.next()).flatten();
+        squares.push(sum_of_squares(response.nodes(), |i| match state {
+            Some(z) => response.component(z)[i],
+            None => {
+                let x = across(ends, &|j| response.displacement(j)[i]);
+                law.phi(x, across(ends, &|j| response.velocity(j)[i]))
+            }
+        }));
+        // Other coefficients have the scale of their values.
+        squares.resize(squares.len() + law.coefficients() - 1, 0.0);
+    }
+    squares
 }
 
 /// [`squares`] of a short record. Steepest descent depends on every bit, so sums are sequential; four columns are

@@ -100,7 +100,7 @@ impl Problem {
             };
             let nodal = halved(nodal, steps);
             let excitation = part.excitation.as_ref();
-            let mut response = Trajectory::zeros(state.coordinates(), part.nodes);
+            let mut response = Trajectory::of(&system.structure, part.nodes);
             let driven = Driven {
                 system: &system,
                 nodal: &nodal,

@@ -65,7 +65,7 @@ impl Experiment {
             .iter()
             .zip(self.initial.components());
         let values = components.map(|(estimated, known)| estimated.map_or(*known, |i| scalars[i]));
-        State::from(values.collect::<Vec<f64>>())
+        State::of_components(self.initial.coordinates(), values.collect())
     }
 
     /// True where no component of the state at the first node is estimated.

@@ -149,12 +149,12 @@ impl<'a> Driven<'a> {
             excitation,
         } = self;
         let grid = &system.grid;
-        let count = nodal.coefficients.len();
-        assert!(count <= system.laws().len(), "a term for each function");
-        assert_eq!(
-            nodal.inertias.len(),
-            system.structure.inertias().len(),
-            "values of each inertia"
+        let (count, inertias) = (nodal.coefficients.len(), nodal.inertias.len());
+        let structure = &system.structure;
+        assert_eq!(inertias, structure.inertias().len(), "values of inertias");
+        assert!(
+            inertias + count <= structure.functions(),
+            "a term for each function"
         );
         assert!(
             nodal.functions().all(|f| f.len() == grid.nodes()),
@@ -262,8 +262,9 @@ impl<'a> Driven<'a> {
     /// [`Driven::adjoint`] with the derivatives at the nodes.
     pub fn nodal_adjoint(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
         let structure = &self.system.structure;
-        let (inertias, elements) = (structure.inertias().len(), structure.laws().len());
-        let mut nodal = NodalCoefficients::zeros(self.nodal.nodes(), inertias, elements);
+        let inertias = structure.inertias().len();
+        let coefficients = structure.functions() - inertias;
+        let mut nodal = NodalCoefficients::zeros(self.nodal.nodes(), inertias, coefficients);
         let gradient = CoefficientGradient::AtNodes(&mut nodal);
         let initial = self.adjoint(trajectory, source, gradient);
         SystemTangent { nodal, initial }
@@ -350,7 +351,7 @@ impl System {
         initial: &State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
-        let mut trajectory = Trajectory::zeros(initial.coordinates(), self.grid.nodes());
+        let mut trajectory = Trajectory::of(&self.structure, self.grid.nodes());
         let driven = Driven {
             system: self,
             nodal,

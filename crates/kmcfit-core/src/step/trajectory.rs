@@ -1,9 +1,12 @@
 //! States at the nodes of the grid.
 
-/// States at all nodes: a matrix with a row for each node and a column for each component, the displacements of the coordinates before
-/// their velocities; stored by column.
+use crate::structure::Structure;
+
+/// States at all nodes: a matrix with a row for each node and a column for each component, the displacements of the coordinates, then their
+/// velocities, then the internal states of elements; stored by column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory {
+    coordinates: usize,
     nodes: usize,
     columns: Vec<f64>,
 }
@@ -11,9 +14,28 @@ pub struct Trajectory {
 impl Trajectory {
     /// States of zero of `coordinates` coordinates at `nodes` nodes.
     pub fn zeros(coordinates: usize, nodes: usize) -> Self {
+        Self::with_internal_states(coordinates, 0, nodes)
+    }
+
+    /// [`Trajectory::zeros`] with internal states.
+    pub fn with_internal_states(coordinates: usize, internal: usize, nodes: usize) -> Self {
         Self {
+            coordinates,
             nodes,
-            columns: vec![0.0; 2 * coordinates * nodes],
+            columns: vec![0.0; (2 * coordinates + internal) * nodes],
+        }
+    }
+
+    /// States of zero of a structure at `nodes` nodes.
+    pub fn of(structure: &Structure, nodes: usize) -> Self {
+        Self::with_internal_states(structure.coordinates(), structure.internal_states(), nodes)
+    }
+
+    /// States of zero of the same structure at the same nodes.
+    pub(crate) fn like(other: &Self) -> Self {
+        Self {
+            columns: vec![0.0; other.columns.len()],
+            ..*other
         }
     }
 
@@ -32,6 +54,7 @@ impl Trajectory {
             "columns of one length"
         );
         Self {
+            coordinates: columns.len() / 2,
             nodes,
             columns: columns.concat(),
         }
@@ -44,10 +67,10 @@ impl Trajectory {
 
     /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
-        self.components() / 2
+        self.coordinates
     }
 
-    /// Number of columns: twice the coordinates.
+    /// Number of columns: twice the coordinates, and the internal states.
     pub fn components(&self) -> usize {
         match self.nodes {
             0 => 0,
@@ -55,8 +78,8 @@ impl Trajectory {
         }
     }
 
-    /// Column `c`: the displacements of coordinate `c`, or the velocities of the coordinate as many columns before as there are
-    /// coordinates.
+    /// Column `c`: the displacements of coordinate `c`, the velocities of the coordinate as many columns before as there are coordinates, or
+    /// an internal state.
     #[inline(always)]
     pub fn component(&self, c: usize) -> &[f64] {
         &self.columns[c * self.nodes..(c + 1) * self.nodes]

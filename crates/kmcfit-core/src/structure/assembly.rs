@@ -26,7 +26,7 @@ pub struct Structure {
     laws: Vec<Law>,
     /// Rows of the elements.
     ends: Vec<Ends>,
-    /// Places in a banded matrix, and values there, of `b b^T` for the row of each function.
+    /// Places in a banded matrix, and values there, of `b b^T` for the row of each inertia and element.
     patterns: Vec<Vec<(usize, f64)>>,
     bandwidth: usize,
     /// Elements of a structure whose steps are compiled: of up to three coordinates with a mass each, without supports, with elements between
@@ -133,7 +133,10 @@ impl Structure {
         let masses = (0..n).map(Ends::ground);
         let is_small = n <= MOST_COMPILED && self.supports == 0 && masses.eq(self.inertias.clone());
         let most = if n == 1 { MOST_ELEMENTS } else { MOST_LINKS };
-        let links = self.elements().map(|(law, ends)| ends.link(law));
+        let links = self.elements().map(|(law, ends)| {
+            let link = ends.link(law);
+            link.filter(|_| !law.has_internal_state())
+        });
         let links: Option<Vec<Link>> = links.collect();
         self.links = links.filter(|links| is_small && links.len() <= most);
         self
@@ -196,7 +199,26 @@ impl Structure {
 
     /// Number of functions of time: inertias and coefficients of elements.
     pub fn functions(&self) -> usize {
-        self.patterns.len()
+        self.function_of(self.laws.len())
+    }
+
+    /// The first function of element `e`; the others of its law follow.
+    pub fn function_of(&self, e: usize) -> usize {
+        let before = self.laws[..e].iter().map(|law| law.coefficients());
+        self.inertias.len() + before.sum::<usize>()
+    }
+
+    /// Number of internal states of elements, in the order of the elements.
+    pub fn internal_states(&self) -> usize {
+        self.laws
+            .iter()
+            .filter(|law| law.has_internal_state())
+            .count()
+    }
+
+    /// Number of components of a state: displacements, velocities, internal states.
+    pub fn components(&self) -> usize {
+        2 * self.coordinates + self.internal_states()
     }
 
     /// Rows of the inertias.
@@ -214,6 +236,11 @@ impl Structure {
         self.laws.iter().copied().zip(&self.ends)
     }
 
+    /// Row of element `e`.
+    pub(crate) fn ends(&self, e: usize) -> &Ends {
+        &self.ends[e]
+    }
+
     pub(crate) fn is_linear(&self) -> bool {
         self.laws.iter().all(|law| law.is_linear())
     }
@@ -222,12 +249,13 @@ impl Structure {
         self.bandwidth
     }
 
-    /// `b b^T` of function `f` as places and values of a [`Banded`] matrix.
+    /// `b b^T` of inertia `f`, or of an element after the inertias, as places and values of a [`Banded`] matrix.
     pub(crate) fn pattern(&self, f: usize) -> &[(usize, f64)] {
         &self.patterns[f]
     }
 
-    /// Squares of the natural frequencies, 1/s^2, in ascending order, for values of the functions, by the linear springs alone; `None`
+    /// Squares of the natural frequencies, 1/s^2, in ascending order, for values of the functions, by the linear springs and the first slope of
+    /// hysteresis; `None`
     /// where the mass matrix is not positive definite.
     pub fn eigenvalues(&self, functions: &[f64]) -> Option<Vec<f64>> {
         self.relative_to_mass(Law::Stiffness, functions)
@@ -262,15 +290,21 @@ impl Structure {
         let sum = |wanted: &dyn Fn(usize) -> bool| {
             let mut matrix = DMatrix::zeros(n, n);
             let rows = self.inertias.iter().chain(&self.ends);
-            for (f, ends) in rows.enumerate().filter(|(f, _)| wanted(*f)) {
+            for (row, ends) in rows.enumerate().filter(|(row, _)| wanted(*row)) {
+                let value = match row.checked_sub(count) {
+                    None => functions[row],
+                    Some(e) => functions[self.function_of(e)],
+                };
                 for (i, a) in free(ends, n) {
-                    free(ends, n).for_each(|(j, b)| matrix[(i, j)] += functions[f] * a * b);
+                    free(ends, n).for_each(|(j, b)| matrix[(i, j)] += value * a * b);
                 }
             }
             matrix
         };
         let mass = sum(&|f| f < count).cholesky()?;
-        let of_law = sum(&|f| f >= count && self.laws[f - count] == law);
+        let is_spring = |other: Law| law == Law::Stiffness && other.has_internal_state();
+        let is_wanted = |other: Law| other == law || is_spring(other);
+        let of_law = sum(&|row| row >= count && is_wanted(self.laws[row - count]));
         let half = mass.l().solve_lower_triangular(&of_law)?;
         let mut whole = mass.l().solve_lower_triangular(&half.transpose())?;
         whole = 0.5 * (&whole + whole.transpose());

@@ -24,6 +24,12 @@ pub enum Law {
     },
     /// `p(t)`, in N: a static force, positive in the direction of negative `x`.
     Offset,
+    /// Hysteresis of Bouc and Wen: `p(t) z`, p in N/m, of an internal state with `z' = r - |z|^(n-1) (beta(t) |r| z + gamma(t) r |z|)`, `z` in m,
+    /// `beta` and `gamma` in 1/m^n. Of several coordinates only.
+    BoucWen {
+        /// `n`, at least 1.
+        exponent: u32,
+    },
 }
 
 /// Largest number of elements of one coordinate: one of each law.
@@ -58,6 +64,8 @@ impl Law {
             Law::QuadraticDamping => r.abs() * r,
             Law::CoulombFriction { width } => r / (r * r + r.like(width * width)).sqrt(),
             Law::Offset => x.like(1.0),
+            // See `Law::with_internal_state`.
+            Law::BoucWen { .. } => x.like(0.0),
         }
     }
 
@@ -76,7 +84,7 @@ impl Law {
                 let square = r * r + r.like(width * width);
                 [None, Some(r.like(width * width) / (square * square.sqrt()))]
             }
-            Law::Offset => [None, None],
+            Law::Offset | Law::BoucWen { .. } => [None, None],
         }
     }
 }

@@ -1,49 +1,61 @@
 //! Nodal values of the coefficient functions, and the state of the system.
 
-/// Displacements (m) of all coordinates, then their velocities (m/s), at one time.
+/// Displacements (m) of all coordinates, then their velocities (m/s), then the internal states of elements, at one time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct State(Vec<f64>);
+pub struct State {
+    coordinates: usize,
+    components: Vec<f64>,
+}
 
 impl State {
     /// Of one coordinate.
     pub fn one(displacement: f64, velocity: f64) -> Self {
-        Self(vec![displacement, velocity])
+        Self::from(vec![displacement, velocity])
     }
 
     /// At rest.
     pub fn rest(coordinates: usize) -> Self {
-        Self(vec![0.0; 2 * coordinates])
+        Self::from(vec![0.0; 2 * coordinates])
+    }
+
+    /// The components of a state of `coordinates` coordinates.
+    pub fn of_components(coordinates: usize, components: Vec<f64>) -> Self {
+        Self {
+            coordinates,
+            components,
+        }
     }
 
     /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
-        self.0.len() / 2
+        self.coordinates
     }
 
-    /// Displacements, then velocities.
+    /// Displacements, then velocities, then internal states.
     pub fn components(&self) -> &[f64] {
-        &self.0
+        &self.components
     }
 
     /// As [`State::components`], mutable.
     pub fn components_mut(&mut self) -> &mut [f64] {
-        &mut self.0
+        &mut self.components
     }
 
     /// Displacement of a coordinate, m.
     pub fn displacement(&self, coordinate: usize) -> f64 {
-        self.0[coordinate]
+        self.components[coordinate]
     }
 
     /// Velocity of a coordinate, m/s.
     pub fn velocity(&self, coordinate: usize) -> f64 {
-        self.0[self.coordinates() + coordinate]
+        self.components[self.coordinates + coordinate]
     }
 }
 
+/// Displacements, then as many velocities.
 impl From<Vec<f64>> for State {
     fn from(components: Vec<f64>) -> Self {
-        Self(components)
+        Self::of_components(components.len() / 2, components)
     }
 }
 

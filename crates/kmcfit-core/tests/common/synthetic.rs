@@ -80,6 +80,7 @@ fn response(term: Law) -> Response {
         Law::QuadraticDamping => Response::Quadratic,
         Law::CoulombFriction { width } => Response::Coulomb(width),
         Law::Offset => Response::Offset,
+        Law::BoucWen { .. } => unreachable!("an internal state"),
     }
 }
 

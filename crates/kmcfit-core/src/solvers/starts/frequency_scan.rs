@@ -146,7 +146,9 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
     let of_law = |wanted: Law| {
         let laws = structure.laws().iter().enumerate();
         let found = laws.filter(|(_, law)| **law == wanted);
-        found.map(|(e, _)| inertias + e).collect::<Vec<usize>>()
+        found
+            .map(|(e, _)| structure.function_of(e))
+            .collect::<Vec<usize>>()
     };
     let (masses, springs) = ((0..inertias).collect::<Vec<_>>(), of_law(Law::Stiffness));
     let average = |levels: &[f64], places: &[usize]| {

@@ -62,7 +62,8 @@ impl Driven<'_> {
                 }
             }
         }
-        State::from(initial.unwrap_or_else(|_| vec![f64::NAN; trajectory.components()]))
+        let components = initial.unwrap_or_else(|_| vec![f64::NAN; trajectory.components()]);
+        State::of_components(trajectory.coordinates(), components)
     }
 
     /// [`Driven::tangent`] along several directions, by the assembled structure.

@@ -1,7 +1,7 @@
 //! Observations of a structure at any time: of combinations of its coordinates, with their derivatives.
 //!
 //! Between nodes, displacements and velocities are cubic Hermite polynomials as for one coordinate ([`observe`](crate::step::observe())):
-//! displacements from values and velocities at both nodes, velocities from values and accelerations there.
+//! displacements from values and velocities at both nodes, velocities from values and accelerations there. Internal states of elements are linear.
 
 use super::super::Trajectory;
 use super::super::engine::Driven;
@@ -105,20 +105,21 @@ impl<'a> RowObserver<'a> {
         [self.shares.forces.clone(), self.shares.frames.clone()]
     }
 
-    /// Multipliers of displacements and velocities at the place that was solved, for weights of the accelerations there.
-    fn pull(&mut self, weights: &[f64]) -> [Vec<f64>; 2] {
+    /// Multipliers of displacements, velocities and internal states at the place that was solved, for weights of the accelerations there.
+    fn pull(&mut self, weights: &[f64]) -> [Vec<f64>; 3] {
         let structure = &self.driven.system.structure;
         let zeros = vec![0.0; weights.len()];
-        let [mut by_q, mut by_v] = [zeros.clone(), zeros.clone()];
-        self.stage.linearise(structure);
+        let internal = vec![0.0; structure.internal_states()];
+        let mut by = [zeros.clone(), zeros.clone(), internal.clone()];
+        self.stage.linearise(structure, 0.0);
         if self.stage.factorise(structure, 0.0).is_err() {
-            by_q.fill(f64::NAN);
+            by[0].fill(f64::NAN);
         } else {
-            let state = [by_q.as_mut_slice(), by_v.as_mut_slice()];
-            let shares = &mut self.shares;
-            (self.stage).pull(structure, 0.0, &zeros, weights, state, shares);
+            let state = by.each_mut().map(Vec::as_mut_slice);
+            let multipliers = [zeros.as_slice(), weights, &internal];
+            (self.stage).pull(structure, 0.0, multipliers, state, &mut self.shares);
         }
-        [by_q, by_v]
+        by
     }
 
     fn of_supports(&self, kind: ChannelKind, row: &Ends, place: TimePoint) -> f64 {
@@ -202,7 +203,17 @@ impl<'a> RowObserver<'a> {
             }
         }
         let structure = &self.driven.system.structure;
-        if self.stage.solve(structure, 0.0, &q, &v).is_err() {
+        let z: Vec<f64> = (2 * n..self.states.components())
+            .map(|c| {
+                let values = self.states.component(c);
+                match x {
+                    0.0 => values[i],
+                    1.0 => values[i + 1],
+                    x => values[i] * (1.0 - x) + values[i + 1] * x,
+                }
+            })
+            .collect();
+        if self.stage.solve(structure, 0.0, [&q, &v, &z]).is_err() {
             self.stage.a.fill(f64::NAN);
         }
     }
@@ -237,7 +248,7 @@ impl<'a> RowObserver<'a> {
 
     fn add_acceleration(&mut self, weights: &[f64], place: TimePoint) {
         self.solve(place);
-        let [by_q, by_v] = self.pull(weights);
+        let [by_q, by_v, by_z] = self.pull(weights);
         for (side, share) in [1.0 - place.fraction, place.fraction]
             .into_iter()
             .enumerate()
@@ -245,6 +256,9 @@ impl<'a> RowObserver<'a> {
             let pairs = self.out.functions[side]
                 .iter_mut()
                 .zip(&self.shares.functions);
+            pairs.for_each(|(to, by)| *to += share * by);
+            let internal = self.out.states[side][2 * weights.len()..].iter_mut();
+            let pairs = internal.zip(&by_z);
             pairs.for_each(|(to, by)| *to += share * by);
         }
         self.add_displacement(&by_q, place);

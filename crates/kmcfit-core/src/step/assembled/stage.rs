@@ -1,7 +1,7 @@
 //! The equation of motion at one stage of a step.
 
 use crate::simd::Real;
-use crate::structure::{Structure, banded::Banded};
+use crate::structure::{Partials, Structure, banded::Banded};
 
 /// A number whose size decides when an iteration ends.
 pub(crate) trait Scalar: Real + PartialEq {
@@ -45,12 +45,15 @@ impl<T: Real> StageValues<T> {
 
 /// State, accelerations and derivatives at one stage.
 ///
-/// The accelerations `a` satisfy the equation of motion at displacements `q + h (v + h a)` and velocities `v + h a`, with the state `q`, `v`
-/// that the stage starts from. An explicit stage has `h = 0`. With the matrices `C` and `K` of the slopes,
+/// The accelerations `a` satisfy the equation of motion at displacements `q + h (v + h a)`, velocities `v + h a` and internal states
+/// `z + h z'`, with the state `q`, `v`, `z` that the stage starts from. An explicit stage has `h = 0`. With the matrices `C` and `K` of the slopes,
 ///
 /// ```text
 /// (M + h C + h^2 K) da = df - M dg'' - sum_e b_e (p_e (slopes) b_e (dq + h dv, dv) + dp_e phi_e) - sum_r b_r dm_r b_r (q'' + g'')
 /// ```
+///
+/// Internal states depend on their own element alone and are eliminated: slopes and `phi` are those of the force with the internal state that
+/// the elongation at the stage gives.
 #[derive(Debug, Clone)]
 pub(crate) struct Stage<T> {
     pub values: StageValues<T>,
@@ -59,15 +62,32 @@ pub(crate) struct Stage<T> {
     pub v: Vec<T>,
     /// Accelerations relative to the frames.
     pub a: Vec<T>,
-    /// `b_r (q'' + g'')` of the inertias, then `phi_e` of the elements.
+    /// Internal states, and their rates.
+    pub z: Vec<T>,
+    pub rates: Vec<T>,
+    /// `b_r (q'' + g'')` of the inertias, then the derivatives of the elements' forces by their coefficients, `phi_e`.
     phi: Vec<T>,
     /// Derivatives of the elements' forces `p_e phi_e` by elongation and rate.
     slopes: Vec<[T; 2]>,
+    /// Of each element with an internal state.
+    internal: Vec<Internal<T>>,
     matrix: Banded<T>,
     /// Values for which the matrix is factorised; empty for none.
     factorised: Vec<T>,
     work: Vec<T>,
     step: Vec<T>,
+}
+
+/// An element with an internal state, and the derivatives of its force and of the rate of its state: by elongation and rate at the stage, by the
+/// state that the stage starts from, and by its coefficients.
+#[derive(Debug, Clone)]
+struct Internal<T> {
+    element: usize,
+    /// First function.
+    first: usize,
+    force_by_state: T,
+    rate_by: [T; 3],
+    rate_by_coefficients: Vec<T>,
 }
 
 /// Why a stage has no solution.
@@ -92,7 +112,19 @@ impl<T: Scalar> Stage<T> {
             structure.coordinates(),
             structure.coordinates() + structure.supports(),
         );
+        let laws = structure.laws().iter().enumerate();
+        let internal = laws.filter(|(_, law)| law.has_internal_state());
+        let internal = internal.map(|(element, law)| Internal {
+            element,
+            first: structure.function_of(element),
+            force_by_state: zero,
+            rate_by: [zero; 3],
+            rate_by_coefficients: vec![zero; law.coefficients()],
+        });
         Self {
+            z: vec![zero; structure.internal_states()],
+            rates: vec![zero; structure.internal_states()],
+            internal: internal.collect(),
             values: StageValues::zeros(structure, zero),
             q: vec![zero; all],
             v: vec![zero; all],
@@ -106,13 +138,12 @@ impl<T: Scalar> Stage<T> {
         }
     }
 
-    /// Solves for the accelerations from the state `q`, `v`; an implicit stage starts from the accelerations there are.
+    /// Solves for the accelerations from the state `q`, `v`, `z`; an implicit stage starts from the accelerations there are.
     pub fn solve(
         &mut self,
         structure: &Structure,
         h: f64,
-        q: &[T],
-        v: &[T],
+        [q, v, z]: [&[T]; 3],
     ) -> Result<(), Trouble> {
         let n = structure.coordinates();
         let zero = q[0].like(0.0);
@@ -126,22 +157,29 @@ impl<T: Scalar> Stage<T> {
         match h == 0.0 || structure.is_linear() {
             true => {
                 self.place(n, h, q, v);
+                self.settle(structure, h, z)?;
                 self.residual(structure);
                 self.newton_step(structure, h)?;
             }
-            false => self.iterate(structure, h, q, v)?,
+            false => self.iterate(structure, h, [q, v, z])?,
         }
         self.place(n, h, q, v);
-        Ok(())
+        self.settle(structure, h, z)
     }
 
     /// Newton's method. A step that does not reduce the residual is halved, down to rounding.
-    fn iterate(&mut self, structure: &Structure, h: f64, q: &[T], v: &[T]) -> Result<(), Trouble> {
+    fn iterate(
+        &mut self,
+        structure: &Structure,
+        h: f64,
+        [q, v, z]: [&[T]; 3],
+    ) -> Result<(), Trouble> {
         let n = structure.coordinates();
         let size = |x: &[T]| x.iter().map(|x| x.value().abs()).fold(0.0, f64::max);
         let (mut norm, mut length, mut further) = (f64::INFINITY, 1.0, T::FURTHER);
         for _ in 0..ITERATIONS {
             self.place(n, h, q, v);
+            self.settle(structure, h, z)?;
             self.residual(structure);
             let now = size(&self.work);
             if now >= norm && length > SHORTEST {
@@ -181,15 +219,15 @@ impl<T: Scalar> Stage<T> {
         &mut self,
         structure: &Structure,
         h: f64,
-        q: &[T],
-        v: &[T],
+        [q, v, z]: [&[T]; 3],
         accelerations: impl Iterator<Item = T>,
-    ) {
+    ) -> Result<(), Trouble> {
         let n = structure.coordinates();
         self.place_supports(n);
         let each = self.a[..n].iter_mut().zip(accelerations);
         each.for_each(|(to, a)| *to = a);
         self.place(n, h, q, v);
+        self.settle(structure, h, z)
     }
 
     fn place_supports(&mut self, n: usize) {
@@ -212,6 +250,47 @@ impl<T: Scalar> Stage<T> {
         }
     }
 
+    /// Internal states at the stage for elongations there, from those `z` that it starts from, with their rates: `z_s = z + h z'`.
+    fn settle(&mut self, structure: &Structure, h: f64, z: &[T]) -> Result<(), Trouble> {
+        self.z.copy_from_slice(z);
+        for k in 0..self.internal.len() {
+            let mut further = T::FURTHER;
+            for iteration in 0.. {
+                let [_, rate] = self.partials(structure, k);
+                self.rates[k] = rate.value;
+                if h == 0.0 {
+                    break;
+                }
+                let missing = z[k] + rate.value.scale(h) - self.z[k];
+                let change = missing / (missing.like(1.0) - rate.by[2].scale(h));
+                self.z[k] = self.z[k] + change;
+                let size = self.z[k].value().abs() + h * rate.value.value().abs();
+                if change.value().abs() <= CONVERGED * size {
+                    if further == 0 {
+                        // The error is squared by each iteration.
+                        self.rates[k] = (self.z[k] - z[k]).scale(1.0 / h);
+                        break;
+                    }
+                    further -= 1;
+                }
+                if iteration == ITERATIONS || !change.value().is_finite() {
+                    return Err(Trouble::Newton);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Force of the element with internal state `k` and the rate of the state, as they are at the stage.
+    fn partials(&self, structure: &Structure, k: usize) -> [Partials<T>; 2] {
+        let Internal { element, first, .. } = self.internal[k];
+        let law = structure.laws()[element];
+        let r = structure.ends(element).across(&self.v);
+        let coefficients = &self.values.functions[first..first + law.coefficients()];
+        let signs = [r, self.z[k]].map(|x| 1f64.copysign(x.value()));
+        law.with_internal_state(coefficients, r, self.z[k], signs)
+    }
+
     /// What is missing in the equation of motion, as forces.
     fn residual(&mut self, structure: &Structure) {
         self.work.copy_from_slice(&self.values.forces);
@@ -222,11 +301,18 @@ impl<T: Scalar> Stage<T> {
             let force = self.values.functions[f] * self.phi[f];
             ends.spread(zero - force, &mut self.work);
         }
-        for (e, (law, ends)) in structure.elements().enumerate() {
+        let mut f = count;
+        for (law, ends) in structure.elements() {
             let phi = law.phi(ends.across(&self.q), ends.across(&self.v));
-            self.phi[count + e] = phi;
-            let force = self.values.functions[count + e] * phi;
+            self.phi[f] = phi;
+            let force = self.values.functions[f] * phi;
             ends.spread(zero - force, &mut self.work);
+            f += law.coefficients();
+        }
+        for k in 0..self.internal.len() {
+            let [force, _] = self.partials(structure, k);
+            let ends = structure.ends(self.internal[k].element);
+            ends.spread(zero - force.value, &mut self.work);
         }
     }
 
@@ -242,20 +328,40 @@ impl<T: Scalar> Stage<T> {
         }
     }
 
-    /// Slopes at the stage, and `phi` of all functions.
-    pub fn linearise(&mut self, structure: &Structure) {
+    /// Slopes at the stage, and `phi` of all functions, for an implicit part `h` of the step.
+    pub fn linearise(&mut self, structure: &Structure, h: f64) {
         self.accelerations_of_inertias(structure);
-        let count = structure.inertias().len();
-        for (e, (law, ends)) in structure.elements().enumerate() {
-            let (x, r) = (ends.across(&self.q), ends.across(&self.v));
-            self.phi[count + e] = law.phi(x, r);
-            self.set_slopes(e, count, law.slopes(x, r));
-        }
+        self.set_slopes(structure, h);
     }
 
-    fn set_slopes(&mut self, e: usize, count: usize, slopes: [Option<T>; 2]) {
-        let p = self.values.functions[count + e];
-        self.slopes[e] = slopes.map(|slope| slope.map_or(p.like(0.0), |slope| p * slope));
+    fn set_slopes(&mut self, structure: &Structure, h: f64) {
+        let mut f = structure.inertias().len();
+        for (e, (law, ends)) in structure.elements().enumerate() {
+            let (x, r) = (ends.across(&self.q), ends.across(&self.v));
+            self.phi[f] = law.phi(x, r);
+            let p = self.values.functions[f];
+            let slopes = law.slopes(x, r);
+            self.slopes[e] = slopes.map(|slope| slope.map_or(p.like(0.0), |slope| p * slope));
+            f += law.coefficients();
+        }
+        for k in 0..self.internal.len() {
+            let [force, rate] = self.partials(structure, k);
+            let one = rate.value.like(1.0);
+            // The state at the stage by elongation, rate, the state before and the coefficients, times 1 - h dz'/dz.
+            let share = one / (one - rate.by[2].scale(h));
+            let internal = &mut self.internal[k];
+            let [by_x, by_r, by_z] = force.by;
+            let through = by_z * share.scale(h);
+            self.slopes[internal.element] =
+                [by_x + through * rate.by[0], by_r + through * rate.by[1]];
+            internal.force_by_state = by_z * share;
+            internal.rate_by = rate.by.map(|by| by * share);
+            for (c, to) in internal.rate_by_coefficients.iter_mut().enumerate() {
+                *to = rate.by_coefficients[c] * share;
+                self.phi[internal.first + c] =
+                    force.by_coefficients[c] + through * rate.by_coefficients[c];
+            }
+        }
     }
 
     /// Factorises `M + h C + h^2 K`; again only where values changed on which it depends.
@@ -277,13 +383,8 @@ impl<T: Scalar> Stage<T> {
                 .add(structure.pattern(f), self.values.functions[f]);
         }
         if h != 0.0 {
-            for (e, (law, ends)) in structure.elements().enumerate() {
-                self.set_slopes(
-                    e,
-                    count,
-                    law.slopes(ends.across(&self.q), ends.across(&self.v)),
-                );
-                let [by_q, by_v] = self.slopes[e];
+            self.set_slopes(structure, h);
+            for (e, [by_q, by_v]) in self.slopes.iter().enumerate() {
                 let factor = by_v.scale(h) + by_q.scale(h * h);
                 self.matrix.add(structure.pattern(count + e), factor);
             }
@@ -320,49 +421,66 @@ impl StageShares {
 }
 
 impl Stage<f64> {
-    /// Multipliers of the state that the stage starts from, added to `state`, for multipliers `velocity` of the velocities at the stage and
-    /// `acceleration` of its accelerations; the factor is that of the stage.
+    /// Multipliers of the state that the stage starts from, added to `state`, for multipliers `velocity` of the velocities at the stage,
+    /// `acceleration` of its accelerations and `rate` of the rates of its internal states; the factor is that of the stage.
     pub fn pull(
         &mut self,
         structure: &Structure,
         h: f64,
-        velocity: &[f64],
-        acceleration: &[f64],
-        state: [&mut [f64]; 2],
+        [velocity, acceleration, rate]: [&[f64]; 3],
+        [by_q, by_v, by_z]: [&mut [f64]; 3],
         shares: &mut StageShares,
     ) {
-        let [by_q, by_v] = state;
         let count = structure.inertias().len();
-        for ((w, a), v) in self.work.iter_mut().zip(acceleration).zip(velocity) {
+        self.step.copy_from_slice(velocity);
+        for (internal, rate) in self.internal.iter().zip(rate) {
+            let ends = structure.ends(internal.element);
+            let [by_x, by_r, _] = internal.rate_by.map(|by| by * rate);
+            ends.spread(by_x, by_q);
+            ends.spread(h * by_x + by_r, &mut self.step);
+        }
+        for ((w, a), v) in self.work.iter_mut().zip(acceleration).zip(&self.step) {
             *w = a + h * v;
         }
         self.matrix.solve(&mut self.work);
         shares.forces.copy_from_slice(&self.work);
-        by_v.iter_mut().zip(velocity).for_each(|(to, v)| *to += v);
+        by_v.iter_mut().zip(&self.step).for_each(|(to, v)| *to += v);
         shares.frames.fill(0.0);
         for (f, ends) in structure.inertias().iter().enumerate() {
             let across = of_coordinates(ends.entries(), &self.work);
             shares.functions[f] = -across * self.phi[f];
             ends.spread(-across * self.values.functions[f], &mut shares.frames);
         }
-        for (e, (_, ends)) in structure.elements().enumerate() {
+        let mut f = count;
+        for (e, (law, ends)) in structure.elements().enumerate() {
             let across = of_coordinates(ends.entries(), &self.work);
-            shares.functions[count + e] = -across * self.phi[count + e];
+            for _ in 0..law.coefficients() {
+                shares.functions[f] = -across * self.phi[f];
+                f += 1;
+            }
             let [slope_q, slope_v] = self.slopes[e];
             ends.spread(-across * slope_q, by_q);
             ends.spread(-across * (slope_v + h * slope_q), by_v);
         }
+        for (k, (internal, rate)) in self.internal.iter().zip(rate).enumerate() {
+            let ends = structure.ends(internal.element);
+            let across = of_coordinates(ends.entries(), &self.work);
+            by_z[k] += rate * internal.rate_by[2] - across * internal.force_by_state;
+            for (c, by) in internal.rate_by_coefficients.iter().enumerate() {
+                shares.functions[internal.first + c] += rate * by;
+            }
+        }
     }
 
-    /// Changes of velocities and accelerations at the stage, in `out`, for changes `q`, `v` of the state that it starts from and changes
-    /// of the values.
+    /// Changes of velocities, accelerations and rates of internal states at the stage, in `out`, for changes `q`, `v`, `z` of the state that it
+    /// starts from and changes of the values.
     pub fn push(
         &mut self,
         structure: &Structure,
         h: f64,
-        [q, v]: [&[f64]; 2],
+        [q, v, z]: [&[f64]; 3],
         changes: &StageValues<f64>,
-        [to_v, to_a]: [&mut [f64]; 2],
+        [to_v, to_a, to_rate]: [&mut [f64]; 3],
     ) {
         let count = structure.inertias().len();
         let n = structure.coordinates();
@@ -375,19 +493,35 @@ impl Stage<f64> {
             let force = self.values.functions[f] * frame + changes.functions[f] * self.phi[f];
             ends.spread(-force, &mut self.work);
         }
-        for (e, (_, ends)) in structure.elements().enumerate() {
+        let mut f = count;
+        for (e, (law, ends)) in structure.elements().enumerate() {
             let [slope_q, slope_v] = self.slopes[e];
             let [dq, dv] = [q, v].map(|x| of_coordinates(ends.entries(), x));
-            let force = slope_q * (dq + h * dv) + slope_v * dv;
-            ends.spread(
-                -force - changes.functions[count + e] * self.phi[count + e],
-                &mut self.work,
-            );
+            let mut force = slope_q * (dq + h * dv) + slope_v * dv;
+            for _ in 0..law.coefficients() {
+                force += changes.functions[f] * self.phi[f];
+                f += 1;
+            }
+            ends.spread(-force, &mut self.work);
+        }
+        for (internal, z) in self.internal.iter().zip(z) {
+            let ends = structure.ends(internal.element);
+            ends.spread(-internal.force_by_state * z, &mut self.work);
         }
         self.matrix.solve(&mut self.work);
         to_a.copy_from_slice(&self.work);
         for j in 0..n {
             to_v[j] = v[j] + h * self.work[j];
+        }
+        for (k, internal) in self.internal.iter().enumerate() {
+            let ends = structure.ends(internal.element);
+            let dr = of_coordinates(ends.entries(), to_v);
+            let dx = of_coordinates(ends.entries(), q) + h * dr;
+            let [by_x, by_r, by_z] = internal.rate_by;
+            let by_coefficients = internal.rate_by_coefficients.iter().enumerate();
+            let of_coefficients =
+                by_coefficients.map(|(c, by)| by * changes.functions[internal.first + c]);
+            to_rate[k] = by_x * dx + by_r * dr + by_z * z[k] + of_coefficients.sum::<f64>();
         }
     }
 }

@@ -45,7 +45,7 @@ pub(crate) trait Source<T> {
     fn read(&self, step: usize, at: At, values: &mut StageValues<T>);
 }
 
-/// Steps of a structure. A state has the displacements of the coordinates, then their velocities.
+/// Steps of a structure. A state has the displacements of the coordinates, then their velocities, then the internal states of elements.
 pub(crate) struct Steps<'a, T> {
     pub structure: &'a Structure,
     scheme: Scheme,
@@ -58,7 +58,7 @@ pub(crate) struct Steps<'a, T> {
 impl<'a, T: Scalar> Steps<'a, T> {
     pub fn new(structure: &'a Structure, method: Method, dt: f64, zero: T) -> Self {
         let scheme = Scheme::of(method);
-        let state = vec![zero; 2 * structure.coordinates()];
+        let state = vec![zero; structure.components()];
         Self {
             structure,
             scheme,
@@ -82,10 +82,10 @@ impl<'a, T: Scalar> Steps<'a, T> {
         self.from.copy_from_slice(x);
         for (s, stage) in self.stages.iter_mut().enumerate() {
             source.read(step, scheme.at[s], &mut stage.values);
-            let (q, v) = self.from.split_at(n);
-            stage.solve(self.structure, h, q, v)?;
+            stage.solve(self.structure, h, parts(&self.from, n))?;
             let [end, next] = [scheme.end[s], scheme.next[s]].map(|share| self.dt * share);
-            for (k, slope) in stage.v[..n].iter().chain(&stage.a[..n]).enumerate() {
+            let slopes = stage.v[..n].iter().chain(&stage.a[..n]);
+            for (k, slope) in slopes.chain(&stage.rates).enumerate() {
                 self.sum[k] = self.sum[k] + slope.scale(end);
                 self.from[k] = x[k] + slope.scale(next);
             }
@@ -110,15 +110,16 @@ impl Steps<'_, f64> {
         match (self.stages.as_mut_slice(), next) {
             ([stage], Some(next)) if h != 0.0 => {
                 source.read(step, scheme.at[0], &mut stage.values);
-                let (q, v) = x.split_at(n);
-                let accelerations = next[n..].iter().zip(v).map(|(next, v)| (next - v) / dt);
-                stage.adopt(self.structure, h, q, v, accelerations);
+                let from = parts(x, n);
+                let velocities = next[n..2 * n].iter().zip(from[1]);
+                let accelerations = velocities.map(|(next, v)| (next - v) / dt);
+                stage.adopt(self.structure, h, from, accelerations)?;
                 x.copy_from_slice(next);
             }
             _ => self.advance(source, step, x)?,
         }
         for stage in &mut self.stages {
-            stage.linearise(self.structure);
+            stage.linearise(self.structure, h);
             stage.factorise(self.structure, h)?;
         }
         Ok(())
@@ -136,7 +137,7 @@ impl Steps<'_, f64> {
         let h = self.dt * scheme.implicit;
         let end = y.to_vec();
         // Of the state from which the next stage starts, then this one.
-        let mut of_start = vec![0.0; 2 * n];
+        let mut of_start = vec![0.0; end.len()];
         for (s, stage) in self.stages.iter_mut().enumerate().rev() {
             let [by_end, by_next] = [scheme.end[s], scheme.next[s]].map(|share| self.dt * share);
             let slopes: Vec<f64> = end
@@ -145,16 +146,8 @@ impl Steps<'_, f64> {
                 .map(|(end, start)| by_end * end + by_next * start)
                 .collect();
             of_start.fill(0.0);
-            let (velocity, acceleration) = slopes.split_at(n);
-            let (by_q, by_v) = of_start.split_at_mut(n);
-            stage.pull(
-                self.structure,
-                h,
-                velocity,
-                acceleration,
-                [by_q, by_v],
-                shares,
-            );
+            let by_state = parts_mut(&mut of_start, n);
+            stage.pull(self.structure, h, parts(&slopes, n), by_state, shares);
             see(scheme.at[s], shares);
             y.iter_mut().zip(&of_start).for_each(|(y, x)| *y += x);
         }
@@ -166,14 +159,13 @@ impl Steps<'_, f64> {
         let (n, scheme) = (self.structure.coordinates(), self.scheme);
         let h = self.dt * scheme.implicit;
         let mut changes = StageValues::zeros(self.structure, 0.0);
-        let mut slopes = vec![0.0; 2 * n];
+        let mut slopes = vec![0.0; x.len()];
         self.sum.copy_from_slice(x);
         self.from.copy_from_slice(x);
         for (s, stage) in self.stages.iter_mut().enumerate() {
             source.read(step, scheme.at[s], &mut changes);
-            let (q, v) = self.from.split_at(n);
-            let (to_v, to_a) = slopes.split_at_mut(n);
-            stage.push(self.structure, h, [q, v], &changes, [to_v, to_a]);
+            let to = parts_mut(&mut slopes, n);
+            stage.push(self.structure, h, parts(&self.from, n), &changes, to);
             let [end, next] = [scheme.end[s], scheme.next[s]].map(|share| self.dt * share);
             for (k, slope) in slopes.iter().enumerate() {
                 self.sum[k] += end * slope;
@@ -182,4 +174,18 @@ impl Steps<'_, f64> {
         }
         x.copy_from_slice(&self.sum);
     }
+}
+
+/// Displacements, velocities and internal states of a state of `n` coordinates.
+fn parts<T>(state: &[T], n: usize) -> [&[T]; 3] {
+    let (q, rest) = state.split_at(n);
+    let (v, z) = rest.split_at(n);
+    [q, v, z]
+}
+
+/// [`parts`], mutable.
+fn parts_mut<T>(state: &mut [T], n: usize) -> [&mut [T]; 3] {
+    let (q, rest) = state.split_at_mut(n);
+    let (v, z) = rest.split_at_mut(n);
+    [q, v, z]
 }

@@ -203,7 +203,7 @@ impl<'a> Motion<'a> {
         let mut steps = self.steps();
         let zeros = vec![0.0; states.components()];
         let (mut x, mut next) = (zeros.clone(), zeros);
-        let empty = Trajectory::zeros(states.coordinates(), states.nodes());
+        let empty = Trajectory::like(states);
         let begin = |(_, initial): &(_, &[f64])| {
             let mut out = empty.clone();
             out.write(0, initial);
@@ -274,7 +274,7 @@ impl StepRow {
     pub fn zeros(structure: &Structure) -> Self {
         let n = structure.coordinates();
         Self {
-            state: vec![0.0; 2 * n],
+            state: vec![0.0; structure.components()],
             functions: vec![[0.0; 2]; structure.functions()],
             forces: vec![[0.0; 2]; n],
             frames: vec![[0.0; 2]; n],

@@ -20,7 +20,7 @@ impl Scalar for Dual64 {
 }
 
 const METHODS: [Method; 3] = [Method::Midpoint, Method::Rk4, Method::ImplicitMidpoint];
-const LAWS: [Law; 8] = [
+const LAWS: [Law; 10] = [
     Law::Damping,
     Law::Stiffness,
     Law::QuadraticStiffness,
@@ -29,6 +29,8 @@ const LAWS: [Law; 8] = [
     Law::QuadraticDamping,
     Law::CoulombFriction { width: 0.2 },
     Law::Offset,
+    Law::BoucWen { exponent: 1 },
+    Law::BoucWen { exponent: 3 },
 ];
 
 /// A structure with random rows, values and inputs.
@@ -74,15 +76,13 @@ impl Case {
             })
             .collect();
         elements.extend(LAWS.map(|law| (law, ends(&mut random))));
-        let levels =
-            inertias
-                .iter()
-                .map(|_| 1.5)
-                .chain(elements.iter().map(|(law, _)| match law {
-                    Law::Stiffness => 3.0,
-                    _ => 0.3,
-                }));
-        let functions = levels
+        let masses = inertias.iter().map(|_| 1.5);
+        let coefficients = elements.iter().flat_map(|(law, _)| match law {
+            Law::Stiffness => vec![3.0],
+            Law::BoucWen { .. } => vec![2.0, 0.8, 0.4],
+            _ => vec![0.3],
+        });
+        let functions = (masses.chain(coefficients))
             .map(|level| {
                 series(&mut random, nodes)
                     .iter()
@@ -98,15 +98,16 @@ impl Case {
             acceleration: samples(random, nodes),
         };
         let motions = (0..supports).map(|_| motion(&mut random)).collect();
+        let structure = Structure::new(n, supports, inertias, elements).expect("a structure");
         Self {
-            structure: Structure::new(n, supports, inertias, elements).expect("a structure"),
             functions,
             excitation: Excitation {
                 forces,
                 frames,
                 supports: motions,
             },
-            initial: series(&mut random, 2 * n),
+            initial: series(&mut random, structure.components()),
+            structure,
             step: 0.05,
         }
     }
@@ -165,9 +166,9 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 
 /// Responses, tangents, adjoints and derivatives by inputs of a case.
 fn check(case: &Case, method: Method, nodes: usize) {
-    let n = case.structure.coordinates();
+    let (n, components) = (case.structure.coordinates(), case.structure.components());
     case.with(method, |motion| {
-        let mut states = Trajectory::zeros(n, nodes);
+        let mut states = Trajectory::of(&case.structure, nodes);
         motion
             .respond(&case.initial, &mut states)
             .expect("a motion");
@@ -177,7 +178,7 @@ fn check(case: &Case, method: Method, nodes: usize) {
             .iter()
             .map(|_| series(&mut random, nodes))
             .collect();
-        let initial = series(&mut random, 2 * n);
+        let initial = series(&mut random, components);
         let zeros = vec![vec![0.0; nodes]; n];
         let inputs: [Vec<Vec<f64>>; 2] =
             [0, 1].map(|_| (0..n).map(|_| series(&mut random, nodes)).collect());
@@ -218,8 +219,12 @@ fn check(case: &Case, method: Method, nodes: usize) {
         }
 
         // A cost that is linear in the states.
-        let source: Vec<Vec<f64>> = (0..2 * n).map(|_| series(&mut random, nodes)).collect();
-        let source = Trajectory::of_columns(&source.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let mut source = Trajectory::like(&states);
+        (0..components).for_each(|c| {
+            source
+                .component_mut(c)
+                .copy_from_slice(&series(&mut random, nodes));
+        });
         let mut gradient = vec![vec![0.0; nodes]; functions.len()];
         let mut columns: Vec<&mut [f64]> = gradient.iter_mut().map(Vec::as_mut_slice).collect();
         let by_initial = motion
@@ -228,7 +233,7 @@ fn check(case: &Case, method: Method, nodes: usize) {
         let products = gradient.iter().flatten().zip(functions.iter().flatten());
         let products = products.chain(by_initial.iter().zip(&initial));
         let products: Vec<f64> = products.map(|(a, b)| a * b).collect();
-        let cost = (0..2 * n).flat_map(|c| {
+        let cost = (0..components).flat_map(|c| {
             let of = |i: usize| source.component(c)[i] * exact[i][c].eps;
             (0..nodes).map(of).collect::<Vec<f64>>()
         });
@@ -236,11 +241,11 @@ fn check(case: &Case, method: Method, nodes: usize) {
         close(products.iter().sum(), cost.sum(), size, "the adjoint");
 
         let nothing: Vec<Vec<f64>> = functions.iter().map(|f| vec![0.0; f.len()]).collect();
-        let exact = by_dual([&inputs[0], &inputs[1]], &nothing, &vec![0.0; 2 * n]);
+        let exact = by_dual([&inputs[0], &inputs[1]], &nothing, &vec![0.0; components]);
         let size = largest(exact.iter().flatten().map(|x| x.eps));
-        let mut change = vec![0.0; 2 * n];
+        let mut change = vec![0.0; components];
         for i in 0..nodes - 1 {
-            let mut x: Vec<f64> = (0..2 * n).map(|c| states.component(c)[i]).collect();
+            let mut x: Vec<f64> = (0..components).map(|c| states.component(c)[i]).collect();
             let rows = motion.step_derivatives(i, &mut x).expect("a step");
             let next = rows.iter().map(|row| {
                 let of_state = row.state.iter().zip(&change).map(|(a, b)| a * b);
@@ -563,5 +568,77 @@ fn what_cannot_be_computed_is_named() {
     assert_eq!(attempt(1.0, -30.0, Method::Rk4), Err(Cause::Overflow));
     for cubic in [0.5, 30.0, 3000.0] {
         assert_eq!(attempt(1.0, cubic, Method::ImplicitMidpoint), Ok(()));
+    }
+}
+
+/// Hysteresis that a support drives in one direction: `z = (1 - exp(-(beta + gamma) x)) / (beta + gamma)` of the elongation `x`, with the order of
+/// the method, and back with `z' = r + (beta - gamma) r z` where `z` keeps its sign.
+#[test]
+fn hysteresis_follows_its_closed_form() {
+    let (beta, gamma) = (1.7, 0.6);
+    let law = Law::BoucWen { exponent: 1 };
+    let elements = vec![(law, Ends::between(1, 0))];
+    // A mass that hardly moves.
+    let structure = Structure::new(1, 1, vec![Ends::ground(0)], elements).expect("a structure");
+    let error = |method: Method, nodes: usize| {
+        let h = 2.0 / (nodes - 1) as f64;
+        let at = |value: &dyn Fn(f64) -> f64| {
+            let step = |i: usize| [0.0, 0.5, 1.0].map(|s| value(h * (i as f64 + s)));
+            StageSamples::new((0..nodes - 1).map(step).collect::<Vec<_>>())
+        };
+        // Forwards until t = 1, then backwards half of the way.
+        let away = |t: f64| {
+            if t < 1.0 {
+                t * t * (3.0 - 2.0 * t)
+            } else {
+                1.0 - 0.5 * (t - 1.0).powi(2)
+            }
+        };
+        let speed = |t: f64| {
+            if t < 1.0 {
+                6.0 * t * (1.0 - t)
+            } else {
+                1.0 - t
+            }
+        };
+        let excitation = Excitation {
+            supports: vec![SupportMotion {
+                displacement: at(&away),
+                velocity: at(&speed),
+                acceleration: at(&|_| 0.0),
+            }],
+            ..Excitation::default()
+        };
+        let values = [1e12, 1.0, beta, gamma].map(|p| vec![p; nodes]);
+        let functions: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+        let motion = Motion {
+            structure: &structure,
+            method,
+            step: h,
+            functions: &functions,
+            excitation: Some(&excitation),
+        };
+        let mut states = Trajectory::of(&structure, nodes);
+        motion.respond(&[0.0; 3], &mut states).expect("a motion");
+        let sum = beta + gamma;
+        let forwards = |x: f64| (1.0 - (-sum * x).exp()) / sum;
+        let exact = |t: f64| match t <= 1.0 {
+            true => forwards(away(t)),
+            false => {
+                // z' = r (1 + (beta - gamma) z) from the turn on.
+                let rate = beta - gamma;
+                let turn = 1.0 + rate * forwards(1.0);
+                (turn * (rate * (away(t) - 1.0)).exp() - 1.0) / rate
+            }
+        };
+        let z = states.component(2);
+        assert!(z[nodes - 1] > 0.0, "the sign stays");
+        largest((0..nodes).map(|i| z[i] - exact(h * i as f64)))
+    };
+    for method in METHODS {
+        let [coarse, fine] = [101, 201].map(|nodes| error(method, nodes));
+        let order = (coarse / fine).log2();
+        let expected = f64::from(method.order());
+        assert!((order - expected).abs() < 0.2, "{method:?}: {order} {fine}");
     }
 }
