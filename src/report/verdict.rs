@@ -9,7 +9,7 @@ use super::run::FittedModel;
 use super::run::RequestedFiles;
 use super::suggestions::percent;
 use super::text::and_list;
-use crate::config::{DataWarning, Model};
+use crate::config::Model;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
@@ -19,6 +19,21 @@ use kmcfit_core::internals::assessment::{
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::solvers::{EquationBalance, Fit, Status};
 use std::collections::BTreeMap;
+
+/// Kinds of the warnings on what a file states of units and scales.
+const STATED_UNITS: [&str; 4] = [
+    "scale_not_applied",
+    "unknown_unit",
+    "unit_of_name_unused",
+    "volts",
+];
+/// Kinds of the warnings that show a wrong unit by the samples.
+const DOUBTFUL_UNITS: [&str; 4] = [
+    "implausible_magnitudes",
+    "mains_hum",
+    "suspicious_factor",
+    "suspicious_mass",
+];
 
 impl FittedModel<'_> {
     /// Verdict on a fit of a model.
@@ -62,10 +77,10 @@ impl FittedModel<'_> {
                 .filter_map(|w| Some(w.text.split_once(": ")?.1))
                 .collect()
         };
-        let mut doubts = doubtful(&DataWarning::STATED_UNITS);
+        let mut doubts = doubtful(&STATED_UNITS);
         doubts.dedup();
         if doubts.is_empty() && !reasons.iter().any(has_units) {
-            doubts = doubtful(&DataWarning::DOUBTFUL_UNITS);
+            doubts = doubtful(&DOUBTFUL_UNITS);
             doubts.truncate(1);
         }
         if !doubts.is_empty() {

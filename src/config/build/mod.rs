@@ -10,7 +10,6 @@ mod refinement;
 mod starts;
 mod study;
 
-pub(crate) use experiments::DataWarning;
 pub(in crate::config) use experiments::known_stretches;
 pub(super) use experiments::sensor_of;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
@@ -303,7 +302,7 @@ fn build_on(
     if !matches!(mode, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
-    let is_unit = |warning: &Finding| warning.kind == DataWarning::UNIT_ASSUMED;
+    let is_unit = |warning: &Finding| warning.kind == experiments::UNIT_ASSUMED;
     let (units, mut warnings): (Vec<_>, Vec<_>) = warnings.into_iter().partition(is_unit);
     // Each channel reads the column of times.
     let mut assumed_units = Vec::new();

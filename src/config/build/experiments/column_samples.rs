@@ -1,6 +1,6 @@
 //! Reading of a column of a file: times, and values in SI units within the time window.
 
-use super::data_facts::{DataAction, DataFact, MOST_PLACES, RecordNotes};
+use super::data_facts::{FIRST, MEAN, MERGED, MOST_PLACES, RecordNotes, fact};
 use super::unit::QuantityColumn;
 use crate::config::ModelFile;
 use crate::config::alternatives::{OneOrList, ScalarOr};
@@ -8,12 +8,14 @@ use crate::config::build::asked_for;
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::config::values::{ColumnId, Text};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::tables::{
-    ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
-    without_rounding,
+    ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, lines_in_words,
+    repeated_times, without_rounding,
 };
 use crate::units::{Quantity, Unit};
+use serde_json::json;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::rc::Rc;
@@ -114,11 +116,8 @@ pub fn read(
     let tables = source.tables(notes)?;
     let table = source.table(&tables)?;
     for note in table.notes() {
-        let text = note.clone();
-        notes.state(
-            &file.experiment_name(wanted.experiment),
-            &DataFact::File { text },
-        );
+        let name = file.experiment_name(wanted.experiment);
+        notes.state(&name, Finding::new("file", note));
     }
     let column_key = match own {
         Some(_) => format!("{column_key}.column"),
@@ -215,16 +214,24 @@ fn repeats(
     if repeated.groups.is_empty() {
         return;
     }
-    let fact = DataFact::RepeatedTimes {
-        count: repeated.excess(),
-        lines: repeated.lines(table, MOST_PLACES),
-        action: match spec.duplicates.unwrap_or_default() {
-            _ if repeated.are_equal => DataAction::Merged,
-            Duplicates::Mean => DataAction::Mean,
-            Duplicates::First | Duplicates::Error => DataAction::First,
-        },
+    let (count, lines) = (repeated.excess(), repeated.lines(table, MOST_PLACES));
+    let action = match spec.duplicates.unwrap_or_default() {
+        _ if repeated.are_equal => MERGED,
+        Duplicates::Mean => MEAN,
+        Duplicates::First | Duplicates::Error => FIRST,
     };
-    notes.state(&file.experiment_name(experiment), &fact);
+    let repeat = if count == 1 {
+        "row repeats"
+    } else {
+        "rows repeat"
+    };
+    let text = format!(
+        "{count} {repeat} a time ({})",
+        lines_in_words(&lines, count)
+    );
+    let found = json!({"count": count, "lines": lines});
+    let fact = fact("repeated_times", &text, action, found);
+    notes.state(&file.experiment_name(experiment), fact);
 }
 
 /// The file of a column: its own, or that of the experiment.
@@ -426,11 +433,14 @@ fn times(
     let values = table.values(index).map_err(asked_for(file, &key))?;
     let mut values = repeated.merged(values, Duplicates::First);
     if let Some(exact) = without_rounding(&values) {
-        let fact = DataFact::RoundedTimes {
-            digits: exact.digits,
-            rate: 1.0 / (exact.step * unit.factor()),
-        };
-        notes.state(&file.experiment_name(number), &fact);
+        let (digits, rate) = (exact.digits, 1.0 / (exact.step * unit.factor()));
+        let text = format!(
+            "times printed with {digits} decimals: taken as equally spaced, at {} Hz",
+            significant(rate, 9)
+        );
+        let found = json!({"digits": digits, "rate": rate});
+        let fact = Finding::having("rounded_times", text, found);
+        notes.state(&file.experiment_name(number), fact);
         values = exact.times.into();
     }
     Ok(Times {

@@ -1,16 +1,18 @@
 //! Delays of channels and inputs: stated ones shift the times, estimated ones leave out the samples that they may move out of the record.
 
 use super::RawRecord;
-use super::data_facts::{DataAction, DataFact, RecordNotes};
+use super::data_facts::{RecordNotes, time};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{DelayValue, ExperimentSpec, InputSensorSpec};
 use crate::config::values::NumberOrEstimate;
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::builder::ScalarSpec;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::system::Grid;
+use serde_json::json;
 use std::sync::Arc;
 
 /// Default limit of an estimated delay, in samples.
@@ -221,12 +223,15 @@ pub fn apply(
 }
 
 fn state(file: &ModelFile, i: usize, channel: &str, seconds: f64, notes: &mut RecordNotes) {
-    let fact = DataFact::Delay {
-        channel: channel.to_owned(),
-        seconds,
-        action: DataAction::Shifted,
-    };
-    notes.state(&file.experiment_name(i), &fact);
+    let text = format!(
+        "times of the {channel} shifted by its delay of {} s",
+        time(seconds)
+    );
+    let found = json!({"channel": channel, "seconds": seconds, "action": "shifted"});
+    notes.state(
+        &file.experiment_name(i),
+        Finding::having("delay", text, found),
+    );
 }
 
 impl super::RawChannel {

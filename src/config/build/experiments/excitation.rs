@@ -1,14 +1,13 @@
 //! Excitation of an experiment: force and base motion.
 
 use super::column_samples::{self, ColumnRequest, ColumnSamples};
-use super::data_facts::{DataAction, DataFact, RecordNotes};
+use super::data_facts::{RecordNotes, USED};
 use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::config::values::Number;
 use crate::error::InputError;
 use crate::units::Quantity;
-use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use std::ops::Range;
@@ -280,14 +279,7 @@ fn signal(
     let quantisation = quantisation_step(&source.values);
     column.check(&mut source, quantisation, notes);
     if let Some(step) = quantisation.filter(|step| is_coarse(*step, &source.values)) {
-        let fact = DataFact::Quantisation {
-            channel: column.name.to_owned(),
-            step: step / source.unit.factor(),
-            unit: source.unit.symbol().to_owned(),
-            share: step / (12.0f64.sqrt() * standard_deviation(&source.values)),
-            action: DataAction::Used,
-        };
-        notes.state(&file.experiment_name(wanted.experiment), &fact);
+        column.state_quantisation(step, &source.values, source.unit, USED, notes);
     }
     let samples = source.times.len();
     Signal::new(source.times, source.values, interpolation).ok_or_else(|| {

@@ -9,7 +9,6 @@ mod excitation;
 mod faults;
 mod shared_samples;
 mod unit;
-mod warning;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
@@ -35,7 +34,7 @@ use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
 
 pub(super) use excitation::shape;
-pub(crate) use warning::DataWarning;
+pub(super) use unit::UNIT_ASSUMED;
 
 /// Data of one experiment before it is placed on the grid, at the times of its samples.
 #[derive(Debug, Clone)]

@@ -1,6 +1,5 @@
 //! Samples that stand where others are meant: one column as an input and as a response, and a record that is listed twice.
 
-use super::warning::DataWarning;
 use super::{RawChannel, RawRecord};
 use crate::config::ModelFile;
 use crate::config::spec::{ColumnRef, ExperimentSpec};
@@ -94,10 +93,11 @@ pub fn repeated_records(file: &ModelFile, records: &[Option<RawRecord>]) -> Vec<
         };
         if let Some(earlier) = (0..later).find(repeats) {
             let [name, other] = [later, earlier].map(|i| file.experiment_name(i));
-            let warning = DataWarning::RepeatedRecord {
-                experiment: name.clone(),
-                other,
-            };
+            let text = format!(
+                "{name} has the samples of {other}: listed twice, they narrow the intervals without further information; remove one"
+            );
+            let warning = Finding::new("repeated_record", text).with("experiment", &name);
+            let warning = warning.with("other", other);
             warnings.push(warning.at(&format!("experiments[{later}] ({name})")));
         }
     }

@@ -4,7 +4,7 @@ mod noise;
 mod sampling;
 
 use super::column_samples::{self, ColumnRequest, ColumnSamples, PresentRows};
-use super::data_facts::{DataFact, RecordNotes};
+use super::data_facts::RecordNotes;
 use super::faults::{Column, is_coarse, quantisation_step};
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
@@ -16,7 +16,6 @@ use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
 use crate::number_format::significant;
 use crate::units::{Quantity, Unit};
-use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
@@ -251,8 +250,8 @@ fn read_one(
     let span = [source.times[0], source.times[source.times.len() - 1]];
     let present = PresentRows::of(&source.values);
     let samples = present.pick(&source.values);
-    let column = format!("{key}.columns.{}", kind.name());
-    refuse_too_little(file, &column, kind, &source, &samples)?;
+    let column_key = format!("{key}.columns.{}", kind.name());
+    refuse_too_little(file, &column_key, kind, &source, &samples)?;
     if missing > 0 {
         ignored.push((missing, "missing".to_owned()));
     }
@@ -266,14 +265,7 @@ fn read_one(
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
     let (weighting, action) = with_quantisation(weighting, step.unwrap_or(0.0));
     if let Some(step) = step {
-        let fact = DataFact::Quantisation {
-            channel: kind.name().to_owned(),
-            step: step / source.unit.factor(),
-            unit: source.unit.symbol().to_owned(),
-            share: step / (12.0f64.sqrt() * standard_deviation(&values)),
-            action,
-        };
-        notes.state(&file.experiment_name(i), &fact);
+        column.state_quantisation(step, &values, source.unit, action, notes);
     }
     Ok(RawChannel {
         kind,

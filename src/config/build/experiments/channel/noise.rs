@@ -1,6 +1,6 @@
 //! Standard deviation of the samples, loss of the residuals, and correlation of the noise.
 
-use super::super::data_facts::DataAction;
+use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
@@ -59,24 +59,21 @@ const NEGLIGIBLE: f64 = 0.1;
 pub(super) fn with_quantisation(
     weighting: Option<Weighting>,
     step: f64,
-) -> (Option<Weighting>, DataAction) {
+) -> (Option<Weighting>, Action) {
     let error = step / 12.0f64.sqrt();
     // An invalid sigma stays, for its message.
     let is_large = |sigma: &f64| *sigma > 0.0 && error > NEGLIGIBLE * sigma;
     match weighting {
-        Some(Weighting::Sigma(sigma)) if is_large(&sigma) => (
-            Some(Weighting::Sigma(sigma.hypot(error))),
-            DataAction::AddedToSigma,
-        ),
+        Some(Weighting::Sigma(sigma)) if is_large(&sigma) => {
+            let weighting = Weighting::Sigma(sigma.hypot(error));
+            (Some(weighting), ADDED_TO_SIGMA)
+        }
         Some(Weighting::Sigmas(sigmas)) if sigmas.iter().any(is_large) => {
             let sigmas = sigmas.iter().map(|sigma| sigma.hypot(error));
-            (
-                Some(Weighting::Sigmas(sigmas.collect())),
-                DataAction::AddedToSigma,
-            )
+            (Some(Weighting::Sigmas(sigmas.collect())), ADDED_TO_SIGMA)
         }
-        Some(Weighting::Estimated { .. }) => (weighting, DataAction::LeastSigma),
-        _ => (weighting, DataAction::Used),
+        Some(Weighting::Estimated { .. }) => (weighting, LEAST_SIGMA),
+        _ => (weighting, USED),
     }
 }
 
