@@ -6,6 +6,7 @@ mod fit;
 mod functions;
 mod grid;
 mod on_grid;
+mod place;
 mod refinement;
 mod starts;
 mod study;
@@ -14,6 +15,7 @@ pub(in crate::config) use experiments::known_stretches;
 pub(super) use experiments::sensor_of;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
+use place::Place;
 pub use refinement::AutomaticGrid;
 pub use study::{StudyPlan, StudyTarget};
 
@@ -122,24 +124,6 @@ impl BuildMode {
     }
 }
 
-/// Moves an error about a whole file to the key of the model that names the file; errors about its rows keep their place.
-fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) -> InputError {
-    let key = key.into();
-    move |error| match &error.place {
-        Location::File(path) => {
-            let problem = format!("{}: {}", path.display(), error.problem);
-            let here = file.error_at(&key, problem);
-            InputError {
-                place: here.place,
-                key: here.key,
-                problem: here.problem,
-                ..error
-            }
-        }
-        _ => error,
-    }
-}
-
 /// The builder of the core for a model file and its data, and the notes on its channels.
 fn builder(
     file: &ModelFile,
@@ -157,8 +141,8 @@ fn builder(
     };
     let shared = functions::shared(file).into_iter();
     let shared = shared.map(|given| {
-        let key = format!("functions.{}", given.0.name());
-        let spec = functions::specification(file, grid, &key, given, defaults)?;
+        let at = Place::new(file, format!("functions.{}", given.0.name()));
+        let spec = functions::specification(&at, grid, given, defaults)?;
         Ok((given.0, spec))
     });
     let shared = shared.collect::<Result<_, _>>()?;
@@ -168,8 +152,8 @@ fn builder(
         builder = builder.simulation();
     }
     let mut notes = Vec::new();
-    for (i, record) in records.into_iter().enumerate() {
-        let (record, of_record) = experiments::specification(file, grid, i, record, defaults)?;
+    for (entry, record) in experiments::Entry::all(file).zip(records) {
+        let (record, of_record) = experiments::specification(&entry, grid, record, defaults)?;
         builder = builder.record(record);
         notes.push(of_record);
     }

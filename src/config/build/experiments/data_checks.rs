@@ -1,7 +1,7 @@
 //! Data checks of a record.
 
 use super::channel::quantity;
-use super::{RawChannel, RawRecord, is_equation_error};
+use super::{Entry, RawChannel, RawRecord, is_equation_error};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
 use crate::config::dominant::Oscillation;
@@ -56,9 +56,9 @@ const OPPOSITE: f64 = 0.7;
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
-/// Warnings about the record of experiment `i`.
-pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
-    let name = file.experiment_name(i);
+/// Warnings about the record of an experiment.
+pub fn of(entry: &Entry<'_>, record: &RawRecord) -> Vec<Finding> {
+    let (file, spec) = (entry.at.file, entry.spec);
     let of_units = || {
         let spectra = ChannelSpectra::of(record);
         let mut warnings = unit_factors(spec, record, &spectra);
@@ -84,10 +84,8 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
     };
     let (mut warnings, others) = both(of_units, of_motion);
     warnings.extend(others);
-    let place = format!("experiments[{i}] ({name})");
     let each = warnings.into_iter();
-    each.map(|warning| warning.at(&place).with("experiment", &name))
-        .collect()
+    each.map(|warning| entry.placed(warning)).collect()
 }
 
 /// A constraint of the natural frequency that excludes the frequency of a free record.

@@ -1,12 +1,12 @@
 //! Faults of the samples of a column, found before the fit: gaps, dropouts, spikes, saturation and quantisation.
 
+use super::Entry;
 use super::column_samples::{ColumnSamples, PresentRows};
 use super::data_facts::{
     Action, EXCLUDED, GapPlace, INTERPOLATED, MISSING, MOST_PLACES, RecordNotes, USED, counted,
     fact, gaps_in_words, spans_in_words, time, times_in_words,
 };
-use crate::config::ModelFile;
-use crate::config::spec::{ExperimentSpec, FaultName};
+use crate::config::spec::FaultName;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::units::Unit;
@@ -27,9 +27,7 @@ const SUSTAINED: f64 = 0.05;
 
 /// A column with its place in the model.
 pub struct Column<'a> {
-    pub file: &'a ModelFile,
-    pub experiment: usize,
-    pub spec: &'a ExperimentSpec,
+    pub entry: &'a Entry<'a>,
     /// Name of the channel in sentences.
     pub name: &'a str,
     /// True for a force or a motion of the base.
@@ -60,28 +58,18 @@ impl Column<'_> {
             let action = if excludes { EXCLUDED } else { USED };
             let level = values[samples[0]];
             let [fact, warning] = self.found(fault, &samples, &times, action, level, source.unit);
-            notes.state(&self.experiment_name(), fact);
+            notes.state(&self.entry.name(), fact);
             if excludes {
                 emptied.extend(samples.iter().map(|i| rows.row(*i)));
                 excluded.push((samples.len(), fault.reason().to_owned()));
             } else if !(self.is_robust && fault == FaultName::Spikes) {
-                notes.warnings.push(self.placed(warning));
+                notes.warnings.push(self.entry.placed(warning));
             }
         }
         for row in emptied {
             source.values[row] = f64::NAN;
         }
         excluded
-    }
-
-    fn experiment_name(&self) -> String {
-        self.file.experiment_name(self.experiment)
-    }
-
-    fn placed(&self, warning: Finding) -> Finding {
-        let (i, name) = (self.experiment, self.experiment_name());
-        let warning = warning.at(&format!("experiments[{i}] ({name})"));
-        warning.with("experiment", name)
     }
 
     /// States the quantisation step of the samples, SI, and what was done about its error.
@@ -102,17 +90,17 @@ impl Column<'_> {
         // The share is the standard deviation of the error, step/sqrt(12), relative to that of the samples.
         let found = json!({"channel": channel, "step": step, "unit": unit, "share": share});
         let fact = fact("quantisation", &text, action, found);
-        notes.state(&self.experiment_name(), fact);
+        notes.state(&self.entry.name(), fact);
     }
 
     fn excludes(&self, fault: FaultName) -> bool {
-        let given = self.spec.exclude.as_ref();
+        let given = self.entry.spec.exclude.as_ref();
         !self.is_input && given.is_some_and(|list| list.values().contains(&fault))
     }
 
     /// Time on the axis of the file, s.
     fn in_file(&self, times: &[f64], i: usize) -> f64 {
-        let zero = self.spec.time_zero.map_or(0.0, |t| t.0);
+        let zero = self.entry.spec.time_zero.map_or(0.0, |t| t.0);
         let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
         round_time(times[i] + zero, spacing)
     }
@@ -150,7 +138,7 @@ impl Column<'_> {
         let action = if self.is_input { INTERPOLATED } else { MISSING };
         let found = json!({"channel": channel, "count": all.len(), "places": places});
         let fact = fact("gaps", &text, action, found);
-        notes.state(&self.experiment_name(), fact);
+        notes.state(&self.entry.name(), fact);
         if let (true, Some(GapPlace { from, to, .. })) = (self.is_input, longest) {
             let text = format!(
                 "the {channel} has {}, across which it is interpolated, the longest from {} to {} s; keep a part without them by \
@@ -161,7 +149,7 @@ impl Column<'_> {
             );
             let found = json!({"channel": channel, "count": all.len(), "longest": [from, to]});
             let warning = Finding::having("input_gaps", text, found);
-            notes.warnings.push(self.placed(warning));
+            notes.warnings.push(self.entry.placed(warning));
         }
     }
 

@@ -1,6 +1,6 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
-use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
@@ -13,9 +13,8 @@ pub const UNIT_ASSUMED: &str = "unit_assumed";
 
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
-    pub file: &'a ModelFile,
-    /// The experiment's key.
-    pub experiment: &'a str,
+    /// The experiment.
+    pub at: &'a Place<'a>,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     pub kind: Quantity,
@@ -54,7 +53,7 @@ impl QuantityColumn<'_> {
 
     /// The key of the column in a map of the experiment.
     fn key(&self, map: &str) -> String {
-        format!("{}.{map}.{}", self.experiment, self.name)
+        format!("{}.{map}.{}", self.at.key, self.name)
     }
 
     /// A warning that the unit `used` is taken from one place, and that another one states another unit.
@@ -77,7 +76,7 @@ impl QuantityColumn<'_> {
         let units_key = self.key("units");
         let other = self.stated();
         let scaled = ScaledUnit::parse(self.kind, &text.0, other)
-            .map_err(|error| self.file.error_about(&units_key, error))?;
+            .map_err(|error| self.at.file.error_about(&units_key, error))?;
         let unit = scaled.unit;
         let differs = |other: &Unit| !other.is_arbitrary() && other.factor() != unit.factor();
         if let Some(other) = other.filter(differs) {

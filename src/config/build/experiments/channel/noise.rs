@@ -2,8 +2,8 @@
 
 use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
-use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
+use crate::config::build::Place;
 use crate::config::spec::{CorrelationName, LossName};
 use crate::config::values::Sigma;
 use crate::error::InputError;
@@ -18,8 +18,7 @@ const STUDENT: f64 = 4.0;
 const FIRST_SIGMA: f64 = 0.05;
 
 pub(super) fn weighting(
-    file: &ModelFile,
-    key: &str,
+    at: &Place<'_>,
     sigma: Option<&Sigma>,
     sigmas: Option<Vec<f64>>,
     values: &[f64],
@@ -34,8 +33,8 @@ pub(super) fn weighting(
         }
         (Some(Sigma::Column(name)), Some(sigmas)) => {
             match sigmas.iter().position(|s| !s.is_finite() || *s <= 0.0) {
-                Some(row) => Err(file
-                    .error_at(key, "a standard deviation must be positive")
+                Some(row) => Err(at
+                    .error("a standard deviation must be positive")
                     .found(match sigmas[row].is_nan() {
                         true => format!("an empty field in `{name}` for sample {}", row + 1),
                         false => format!(
@@ -77,8 +76,8 @@ pub(super) fn with_quantisation(
     }
 }
 
-pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, InputError> {
-    let key = format!("{key}.loss.{}", of_kind.kind.name());
+pub(super) fn loss(at: &Place<'_>, of_kind: &Spec) -> Result<Loss, InputError> {
+    let at = at.below(&format!("loss.{}", of_kind.kind.name()));
     let (name, threshold, degrees) = match of_kind.loss {
         None => return Ok(Loss::Squares),
         Some(ScalarOr::Scalar(name)) => (*name, None, None),
@@ -90,20 +89,14 @@ pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, 
     ] {
         match given {
             Some(_) if name != owner => {
-                return Err(file
-                    .error_at(
-                        &format!("{key}.{part}"),
-                        format!("`{name}` has no `{part}`"),
-                    )
+                return Err(at
+                    .error_in(part, format!("`{name}` has no `{part}`"))
                     .found(format!("`{part}`"))
                     .expected(format!("`{part}` for `{owner}` only")));
             }
             Some(number) if number.0 <= 0.0 => {
-                return Err(file
-                    .error_at(
-                        &format!("{key}.{part}"),
-                        format!("the `{part}` must be positive"),
-                    )
+                return Err(at
+                    .error_in(part, format!("the `{part}` must be positive"))
                     .found(number.0)
                     .expected(match part {
                         "threshold" => "a number greater than 0, in standard deviations",
