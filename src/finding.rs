@@ -72,6 +72,16 @@ impl Finding {
         Self::of(variant, variant.to_string())
     }
 
+    /// A quantity that is a text.
+    pub fn said(&self, name: &str) -> Option<String> {
+        Some(self.quantities.get(name)?.as_str()?.to_owned())
+    }
+
+    /// A quantity that is a number.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.quantities.get(name)?.as_f64()
+    }
+
     /// The sentences of findings.
     pub fn texts(findings: &[Self]) -> Vec<String> {
         findings.iter().map(|f| f.text.clone()).collect()

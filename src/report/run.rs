@@ -92,6 +92,21 @@ impl Model {
     }
 }
 
+impl<'a> FittedModel<'a> {
+    /// A fit without predictions, a choice of the weight and requested files.
+    pub(super) fn new(model: &'a Model, fit: &'a Fit, run_assessment: &'a RunAssessment) -> Self {
+        Self {
+            model,
+            fit,
+            predictions: &[],
+            weights: None,
+            run_assessment,
+            requested: RequestedFiles::default(),
+            computed: Computed::default(),
+        }
+    }
+}
+
 impl FittedModel<'_> {
     /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
     /// the elapsed time multiplied by the share of writing in the working time of the threads.

@@ -85,11 +85,9 @@ impl Model {
     pub fn is_kept_up(&self) -> bool {
         let mut experiments = self.problem.experiments.iter();
         experiments.all(|experiment| {
-            self.warnings.iter().any(|warning| {
-                let of = warning.quantities.get("experiment");
-                warning.kind == "unmeasured_force"
-                    && of.and_then(|name| name.as_str()) == Some(&experiment.name)
-            })
+            let is_of = |w: &Finding| w.said("experiment").as_ref() == Some(&experiment.name);
+            let mut warnings = self.warnings.iter();
+            warnings.any(|w| w.kind == "unmeasured_force" && is_of(w))
         })
     }
 }

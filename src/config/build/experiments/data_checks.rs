@@ -1,6 +1,5 @@
 //! Data checks of a record.
 
-use super::channel::quantity;
 use super::{Entry, RawChannel, RawRecord, is_equation_error};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
@@ -203,7 +202,7 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
     };
     let all = record.channels.iter().filter(|c| !c.unit.is_arbitrary());
     let all: Vec<Magnitude> = all
-        .filter_map(|c| Magnitude::of(quantity(c.kind), c.unit, &c.values))
+        .filter_map(|c| Magnitude::of(c.kind.into(), c.unit, &c.values))
         .collect();
     let pairs = first
         .times

@@ -16,7 +16,7 @@ use crate::config::spec::{
 use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
 use crate::number_format::significant;
-use crate::units::{Quantity, Unit};
+use crate::units::Unit;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
@@ -110,15 +110,6 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
     }
 }
 
-/// The measured quantity of a channel.
-pub fn quantity(kind: ChannelKind) -> Quantity {
-    match kind {
-        ChannelKind::Displacement => Quantity::Displacement,
-        ChannelKind::Velocity => Quantity::Velocity,
-        ChannelKind::Acceleration => Quantity::Acceleration,
-    }
-}
-
 /// Settings of the sensor of a channel in the model file.
 pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
     spec_of(spec, kind).sensor
@@ -208,7 +199,7 @@ fn read_one(
     let wanted = ColumnRequest {
         entry,
         name: kind.name(),
-        kind: quantity(kind),
+        kind: kind.into(),
         column,
         unit: of_kind.unit,
         beside: sigma_column,
