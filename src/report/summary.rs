@@ -9,7 +9,7 @@ use super::extent::{extent, validation};
 use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
-use super::suggestions;
+use super::suggestions::percent;
 pub(crate) use super::text::count;
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
@@ -155,12 +155,12 @@ fn fit(document: &ResultDocument) -> Vec<String> {
         }
         (None, [only]) => format!(
             "{} of {}; residual {} {} rms",
-            fit_percent(worst),
+            percent(worst, 2),
             only.kind,
             significant(only.rms_residual, 3),
             only.unit
         ),
-        (None, _) => format!("{} for the worst channel", fit_percent(worst)),
+        (None, _) => format!("{} for the worst channel", percent(worst, 2)),
     };
     let outliers = channels.iter().map(|c| c.outliers).sum::<usize>();
     if outliers > 0 {
@@ -177,10 +177,6 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     let classical = document.classical.as_ref().filter(is_sharp);
     let classical = classical.map(findings::classical);
     std::iter::once(text).chain(classical).collect()
-}
-
-fn fit_percent(fit: f64) -> String {
-    suggestions::percent(fit, 2)
 }
 
 /// Nuisance parameters with their intervals.

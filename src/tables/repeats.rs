@@ -31,6 +31,12 @@ pub struct RepeatedTimes {
 }
 
 impl RepeatedTimes {
+    /// Times that are all different.
+    pub const NONE: Self = Self {
+        groups: Vec::new(),
+        are_equal: true,
+    };
+
     /// Rows that a merged column does not have.
     pub fn excess(&self) -> usize {
         self.groups.iter().map(|rows| rows.len() - 1).sum()

@@ -66,28 +66,8 @@ pub(super) fn all(file: &ModelFile) -> Vec<Given<'_>> {
     shared(file).into_iter().chain(own).collect()
 }
 
-/// Start values from the records, for functions without `start`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RecordStarts {
-    /// kg.
-    pub mass: f64,
-    /// N s/m.
-    pub damping: f64,
-    /// N/m.
-    pub stiffness: f64,
-}
-
-impl RecordStarts {
-    /// Start value of a function; `None` for terms beside mass, damping and stiffness.
-    fn of_kind(&self, kind: CoefficientKind) -> Option<f64> {
-        match kind {
-            CoefficientKind::Mass => Some(self.mass),
-            CoefficientKind::Damping => Some(self.damping),
-            CoefficientKind::Stiffness => Some(self.stiffness),
-            _ => None,
-        }
-    }
-}
+/// Start values of mass (kg), damping (N s/m) and stiffness (N/m) from the records, for functions without `start`.
+pub(super) type RecordStarts = [(CoefficientKind, f64); 3];
 
 /// What a function takes that its keys leave out.
 #[derive(Clone, Copy)]
@@ -129,15 +109,16 @@ pub(super) fn specification(
         }
         (None, None, None) if is_own && is_known_part_alone(given) => CoefficientSpec::shared(),
         (None, None, basis_name) => {
-            let start = defaults.starts.and_then(|starts| starts.of_kind(kind));
-            let Some((basis_name, start)) = basis_name.zip(start) else {
+            let mut starts = defaults.starts.into_iter().flatten();
+            let start = starts.find(|(of, _)| *of == kind);
+            let Some((basis_name, (_, start))) = basis_name.zip(start) else {
                 return Err(at
                     .error("this function has neither a start nor a fixed value")
                     .expected("`start` for a function to be fitted, `fixed` for a known one")
                     .hint("mass, damping and stiffness of a fit start from the record"));
             };
             let basis = basis(at, given, basis_name)?;
-            CoefficientSpec::estimated(basis, builder::Start::Constant(start))
+            CoefficientSpec::estimated(basis, builder::Start::Constant(*start))
         }
         (None, Some(_), None) => {
             return Err(at

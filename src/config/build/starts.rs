@@ -57,11 +57,11 @@ pub(super) fn of_records(
         .filter(|m| *m > 0.0)
         .unwrap_or(1.0);
     let stiffness = mass * omega * omega;
-    Some(RecordStarts {
-        mass,
-        damping: 2.0 * ratio * mass * omega,
-        stiffness,
-    })
+    Some([
+        (CoefficientKind::Mass, mass),
+        (CoefficientKind::Damping, 2.0 * ratio * mass * omega),
+        (CoefficientKind::Stiffness, stiffness),
+    ])
 }
 
 /// Mean of the fixed or start values of a shared function that states them. An error of their column is reported where the function is built.

@@ -15,7 +15,6 @@ use kmcfit_core::internals::record::{
 };
 use kmcfit_core::internals::study::Choice;
 use kmcfit_core::internals::system::State;
-use std::time::Duration;
 
 /// Settings of the analyses of `study`.
 #[derive(Debug, Clone)]
@@ -40,8 +39,6 @@ pub struct StudyPlan {
     pub equivalent_systems: Vec<Choice>,
     /// Candidate experiments, with one channel read at every node; only the noise of its samples is used.
     pub candidates: Vec<Experiment>,
-    /// Wall-clock limit of one refit.
-    pub limit: Option<Duration>,
 }
 
 impl StudyPlan {
@@ -118,7 +115,6 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         spread,
         merge_tolerance,
         candidates,
-        limit: None,
     })
 }
 

@@ -12,7 +12,7 @@ use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, lines_in_words,
-    repeated_times, without_rounding,
+    repeated_times, sample_rates, without_rounding,
 };
 use crate::units::{Quantity, Unit};
 use serde_json::json;
@@ -345,18 +345,13 @@ fn times(
             return Err(at
                 .error_in("sample_rate", "invalid sampling rate")
                 .found(format!("{:?}", rate.0))
-                .expected(rates()));
+                .expected(sample_rates()));
         }
-        let values = (0..table.rows()).map(|i| i as f64 / rate.0).collect();
-        let label = String::new();
         return Ok(Times {
-            values,
-            label,
+            values: (0..table.rows()).map(|i| i as f64 / rate.0).collect(),
+            label: String::new(),
             unit: None,
-            repeated: RepeatedTimes {
-                groups: Vec::new(),
-                are_equal: true,
-            },
+            repeated: RepeatedTimes::NONE,
         });
     }
     let default = ColumnId::Name(TIME_COLUMN.to_owned());
@@ -402,12 +397,6 @@ fn times(
         unit: Some(unit.unit),
         repeated,
     })
-}
-
-/// The sampling rates that are accepted, for messages.
-fn rates() -> String {
-    let (least, most) = (SAMPLE_RATES.start(), SAMPLE_RATES.end());
-    format!("samples per second, a number from {least:e} to {most:e}")
 }
 
 fn two_times(at: &Place<'_>) -> InputError {
