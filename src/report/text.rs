@@ -106,14 +106,6 @@ pub(crate) fn prose(text: &str) -> String {
     parts.collect()
 }
 
-/// A count with its noun in the singular or plural.
-pub fn count(number: usize, thing: &str) -> String {
-    match number {
-        1 => format!("1 {thing}"),
-        _ => format!("{number} {thing}s"),
-    }
-}
-
 /// `a, b and c`.
 pub fn and_list(names: &[String]) -> String {
     match names {

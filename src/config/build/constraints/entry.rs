@@ -8,6 +8,7 @@ use crate::config::build::functions::history;
 use crate::config::spec::{ConstraintSpec, RangeSpec};
 use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;
+use crate::number_format::count;
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::{Grid, TimePoint};
@@ -295,8 +296,7 @@ impl ConstraintReader<'_> {
                 .error("equal", "an equality needs two functions")
                 .found(match names.len() {
                     0 => "an empty list".to_owned(),
-                    1 => "1 function".to_owned(),
-                    n => format!("{n} functions"),
+                    n => count(n, "function"),
                 })
                 .expected("two functions, as in [damping, stiffness]")),
         }

@@ -3,7 +3,7 @@
 use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::number_format::significant;
+use crate::number_format::{count as counted, significant};
 use crate::tables::{Table, TableFormat};
 use serde::Serialize;
 use serde_json::Value;
@@ -97,14 +97,6 @@ pub struct GapPlace {
     pub to: f64,
     /// Number of samples that it would have.
     pub samples: usize,
-}
-
-/// A number of things: `2 gaps`.
-pub fn counted(count: usize, name: &str) -> String {
-    match count {
-        1 => format!("1 {name}"),
-        _ => format!("{count} {name}s"),
-    }
 }
 
 /// A time, s.

@@ -3,12 +3,12 @@
 use super::Entry;
 use super::column_samples::{ColumnSamples, PresentRows};
 use super::data_facts::{
-    Action, EXCLUDED, GapPlace, INTERPOLATED, MISSING, MOST_PLACES, RecordNotes, USED, counted,
-    fact, gaps_in_words, spans_in_words, time, times_in_words,
+    Action, EXCLUDED, GapPlace, INTERPOLATED, MISSING, MOST_PLACES, RecordNotes, USED, fact,
+    gaps_in_words, spans_in_words, time, times_in_words,
 };
 use crate::config::spec::FaultName;
 use crate::finding::Finding;
-use crate::number_format::significant;
+use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};

@@ -15,7 +15,7 @@ use crate::config::spec::{
 };
 use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
-use crate::number_format::significant;
+use crate::number_format::{count, significant};
 use crate::units::Unit;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
@@ -281,8 +281,7 @@ fn refuse_too_little(
                 .found(format!("{missing} rows without a number in `{label}`"))
                 .expected("at least one sample"));
         }
-        [_] => "1 sample".to_owned(),
-        few if few.len() < Grid::FEWEST_NODES => format!("{} samples", few.len()),
+        few if few.len() < Grid::FEWEST_NODES => count(few.len(), "sample"),
         [first, ..] => {
             if samples.iter().any(|sample| sample != first) {
                 return Ok(());

@@ -4,6 +4,7 @@ use super::super::column_samples;
 use crate::config::build::Place;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
+use crate::number_format::count;
 use kmcfit_core::internals::signal::even_spacing;
 use kmcfit_core::internals::signal::{self, SecondOrder};
 
@@ -63,8 +64,7 @@ pub(super) fn band(
             .error("filtering needs equally spaced samples without gaps")
             .found(match missing {
                 0 => "times that are not equally spaced".to_owned(),
-                1 => "1 missing sample".to_owned(),
-                count => format!("{count} missing samples"),
+                some => count(some, "missing sample"),
             })
             .expected("no `band`, or a window without gaps"));
     };
