@@ -138,7 +138,7 @@ fn status(document: &ResultDocument, estimate: &Estimate) -> String {
         EstimateStatus::Estimated if !estimate.value.is_finite() => "not defined".to_owned(),
         _ if is_not_unique(document, estimate) => "not unique".to_owned(),
         EstimateStatus::Estimated => "estimated".to_owned(),
-        EstimateStatus::Fixed => match others_scale(document) {
+        EstimateStatus::Fixed => match fixed_name(document).is_some() {
             true => "fixed; the others scale with it".to_owned(),
             false => "fixed".to_owned(),
         },
@@ -158,10 +158,6 @@ fn is_not_unique(document: &ResultDocument, estimate: &Estimate) -> bool {
     is_estimated
         && document.cost.regularisation == 0.0
         && document.verdict.as_ref().is_some_and(is_deficient)
-}
-
-fn others_scale(document: &ResultDocument) -> bool {
-    fixed_name(document).is_some()
 }
 
 /// Name of the fixed function that determines the scale of all others.

@@ -386,10 +386,6 @@ impl FittedModel<'_> {
         functions.iter().zip(values).collect()
     }
 
-    pub(super) fn true_function(&self, index: usize) -> Option<&[f64]> {
-        self.model.truth.as_ref()?.functions().nth(index)
-    }
-
     fn experiment_summaries(&self) -> Vec<ExperimentSummary> {
         let predictions = &self.fit.best.evaluation.predictions;
         let pairs = self.model.problem.experiments.iter().zip(predictions);

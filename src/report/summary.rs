@@ -101,9 +101,9 @@ fn truth(document: &ResultDocument) -> Option<String> {
 /// End of the search, cost and work, findings, nuisance parameters, constraints and attempts.
 fn details(document: &ResultDocument) -> String {
     let (cost, outcome, counts) = (&document.cost, &document.outcome, &document.counts);
-    let ratio = match document.has_ratio() {
-        true => format!(", J/J0 {:.4e}", cost.ratio),
-        false => String::new(),
+    let ratio = match document.estimates_sigma() {
+        true => String::new(),
+        false => format!(", J/J0 {:.4e}", cost.ratio),
     };
     let (others, what) = match (counts.adjoint, counts.tangent) {
         (0, tangent @ 1..) => (tangent, "tangent"),

@@ -1,14 +1,13 @@
 //! Reasons of the verdict on a fit in words, each a clause of one line.
 
 use super::document::{Estimates, Verdict};
-use super::fit_assessment::{RunAssessment, ValidationRecord};
+use super::fit_assessment::ValidationRecord;
 use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;
 use super::rivals::{rival_in_words, term_in_words};
 use super::run::FittedModel;
 use super::suggestions::percent;
 use super::text::and_list;
-use crate::config::Model;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
@@ -16,7 +15,7 @@ use kmcfit_core::internals::assessment::{
     VerdictReason, estimates, verdict_assumptions, verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::solvers::{EquationBalance, Fit, Status};
+use kmcfit_core::internals::solvers::{EquationBalance, Status};
 use std::collections::BTreeMap;
 
 /// Kinds of the warnings on what a file states of units and scales.
@@ -35,11 +34,6 @@ const DOUBTFUL_UNITS: [&str; 4] = [
 ];
 
 impl FittedModel<'_> {
-    /// Verdict on a fit of a model.
-    pub(super) fn verdict_of(model: &Model, fit: &Fit) -> Verdict {
-        FittedModel::new(model, fit, &RunAssessment::of(model, fit)).verdict()
-    }
-
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
     pub(super) fn verdict(&self) -> Verdict {
         let problem = &self.model.problem;

@@ -196,7 +196,8 @@ fn records_of(
     }
     let mut found = Vec::new();
     for (i, table) in tables.iter().enumerate() {
-        let columns = ColumnAssignment::without_guess(table, statements.sample_rate);
+        let columns =
+            ColumnAssignment::as_in_run(table, statements.sample_rate, Vec::new(), Vec::new());
         let is_record = |columns: &ColumnAssignment| columns.channels().next().is_some();
         if columns.is_ok_and(|columns| is_record(&columns)) {
             found.push(i);

@@ -12,7 +12,7 @@ use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
-use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::record::{ChannelKind, Loss};
 use kmcfit_core::internals::signal::{
     Interpolation, Signal, Spectrum, driven_oscillator, is_kept_up, median, onset,
     two_forced_modes, two_modes,
@@ -246,7 +246,7 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     };
     let channel = record.channels.first()?;
     let spacing = channel.spacing?;
-    let force = record.excitation.forces_at(&channel.times)?;
+    let force = record.forces_at(&channel.times)?;
     let [implied, ..] = driven_oscillator(&force, &channel.values, spacing, channel.kind as i32)?;
     let (channel, ratio) = (channel.kind.name(), implied / stated);
     let factor = factor_near(ratio, record)?;
@@ -354,7 +354,7 @@ fn unmeasured_force(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding
 /// Codes for missing samples, which no statement of the model takes as such.
 fn missing_codes(record: &RawRecord) -> Option<Finding> {
     let (mut channels, mut codes): (Vec<String>, Vec<f64>) = Default::default();
-    for channel in record.channels.iter().filter(|c| c.is_squared()) {
+    for channel in record.channels.iter().filter(|c| c.loss == Loss::Squares) {
         // Digits of the file, without the rounding of the conversion to SI.
         let in_file = |x: &f64| significant(x / channel.unit.factor(), 12).parse();
         let values: Vec<f64> = (channel.values.iter())
@@ -385,7 +385,7 @@ fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
         if !has_input(spec, record) {
             return two_modes(&c.values, c.median_spacing);
         }
-        let force = record.excitation.forces_at(&c.times)?;
+        let force = record.forces_at(&c.times)?;
         two_forced_modes(&force, &c.values, c.median_spacing, c.kind as i32)
     };
     let each = record.channels.iter().filter(|c| c.spacing.is_some());
@@ -403,7 +403,7 @@ fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
 }
 
 fn has_input(spec: &ExperimentSpec, record: &RawRecord) -> bool {
-    !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some()
+    !record.is_free() || spec.force.is_some() || spec.base.is_some()
 }
 
 /// A free record that begins at rest, before the release or the impact.
@@ -430,7 +430,7 @@ fn in_file(spec: &ExperimentSpec, channel: &RawChannel, sample: usize) -> f64 {
 
 /// Outliers of a channel with a quadratic loss.
 fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<Finding> {
-    if !channel.is_squared() {
+    if channel.loss != Loss::Squares {
         return None;
     }
     let level = median(channel.values.as_slice());

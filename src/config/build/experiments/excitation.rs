@@ -12,85 +12,9 @@ use crate::units::Quantity;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use std::ops::Range;
-use std::sync::Arc;
 
-/// Excitation of an experiment, as samples or shapes.
-#[derive(Debug, Default, Clone)]
-pub struct RawExcitation {
-    input: Input,
-}
-
-impl RawExcitation {
-    /// True for a free response.
-    pub fn is_empty(&self) -> bool {
-        self.input.force.is_none() && self.input.base.is_none()
-    }
-
-    /// Shares the times of a channel, s, with the signals that have the same.
-    pub fn share_times(&mut self, times: &Arc<Vec<f64>>) {
-        self.input.share_times(times);
-    }
-
-    /// Force and motion of the base.
-    pub fn into_input(self) -> Input {
-        self.input
-    }
-
-    /// True for a force and a motion of the base.
-    pub fn has_two_inputs(&self) -> bool {
-        self.input.force.is_some() && self.input.base.is_some()
-    }
-
-    /// Samples of the force, if it alone acts.
-    pub fn force(&self) -> Option<&Signal> {
-        match &self.input {
-            Input {
-                force: Some(Waveform::Samples(signal)),
-                base: None,
-            } => Some(signal),
-            _ => None,
-        }
-    }
-
-    /// The measured input and its name, if it is one series of samples.
-    pub fn samples(&self) -> Option<(&'static str, &Signal)> {
-        match (&self.input.force, &self.input.base) {
-            (Some(Waveform::Samples(signal)), None) => Some(("force", signal)),
-            (None, Some(BaseMotion::Acceleration(signal))) => Some(("base_acceleration", signal)),
-            (None, Some(BaseMotion::Displacement(signal))) => Some(("base_displacement", signal)),
-            _ => None,
-        }
-    }
-
-    /// Forces (N) at some times (s), if measured and if no other input acts.
-    pub fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
-        self.force()?;
-        self.input.forces_at(times)
-    }
-
-    /// Sampling interval of equally spaced samples, s.
-    pub fn spacing(&self) -> Option<f64> {
-        let force = match &self.input.force {
-            Some(Waveform::Samples(signal)) => Some(signal),
-            _ => None,
-        };
-        let base = match &self.input.base {
-            Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) => {
-                Some(signal)
-            }
-            None => None,
-        };
-        let times = force.or(base)?.times();
-        let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;
-        let regular = times
-            .windows(2)
-            .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
-        (regular && spacing > 0.0).then_some(spacing)
-    }
-}
-
-/// Reads the excitation of experiment `i`.
-pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<RawExcitation, InputError> {
+/// Reads the excitation of an experiment.
+pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Input, InputError> {
     let (at, spec) = (&entry.at, entry.spec);
     let columns = spec.columns.as_ref();
     let units = spec.units.as_ref();
@@ -119,8 +43,7 @@ pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<RawExcitation,
         }
     };
     let base = base(entry, notes)?;
-    let input = Input { force, base };
-    Ok(RawExcitation { input })
+    Ok(Input { force, base })
 }
 
 fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>, InputError> {

@@ -26,13 +26,15 @@ pub(super) use channel::RawChannel;
 pub(in crate::config) use channel::sensor_of;
 pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
-use excitation::RawExcitation;
 pub(in crate::config) use excitation::known_stretches;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
-use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind};
+use kmcfit_core::internals::record::{
+    BaseMotion, ChannelKind, Experiment, Input, InputErrorKind, Waveform,
+};
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
+use std::sync::Arc;
 
 pub(super) use excitation::shape;
 pub(super) use unit::UNIT_ASSUMED;
@@ -41,18 +43,40 @@ pub(super) use unit::UNIT_ASSUMED;
 #[derive(Debug, Clone)]
 pub(super) struct RawRecord {
     pub channels: Vec<RawChannel>,
-    excitation: RawExcitation,
+    input: Input,
 }
 
 impl RawRecord {
     /// Samples of the force, if it alone acts.
     pub fn force(&self) -> Option<&Signal> {
-        self.excitation.force()
+        match &self.input {
+            Input {
+                force: Some(Waveform::Samples(signal)),
+                base: None,
+            } => Some(signal),
+            _ => None,
+        }
+    }
+
+    /// The measured input and its name, if it is one series of samples.
+    fn input_samples(&self) -> Option<(&'static str, &Signal)> {
+        match (&self.input.force, &self.input.base) {
+            (Some(Waveform::Samples(signal)), None) => Some(("force", signal)),
+            (None, Some(BaseMotion::Acceleration(signal))) => Some(("base_acceleration", signal)),
+            (None, Some(BaseMotion::Displacement(signal))) => Some(("base_displacement", signal)),
+            _ => None,
+        }
+    }
+
+    /// Forces (N) at some times (s), if measured and if no other input acts.
+    fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
+        self.force()?;
+        self.input.forces_at(times)
     }
 
     /// True for a free response.
     pub fn is_free(&self) -> bool {
-        self.excitation.is_empty()
+        self.input.force.is_none() && self.input.base.is_none()
     }
 
     /// First time of its rows, missing samples included, s.
@@ -69,12 +93,27 @@ impl RawRecord {
 
     /// True for a force and a motion of the base.
     fn has_two_inputs(&self) -> bool {
-        self.excitation.has_two_inputs()
+        self.input.force.is_some() && self.input.base.is_some()
     }
 
     /// Sampling interval of force or base motion, if equally spaced, s.
     pub fn drive_spacing(&self) -> Option<f64> {
-        self.excitation.spacing()
+        let force = match &self.input.force {
+            Some(Waveform::Samples(signal)) => Some(signal),
+            _ => None,
+        };
+        let base = match &self.input.base {
+            Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) => {
+                Some(signal)
+            }
+            None => None,
+        };
+        let times = force.or(base)?.times();
+        let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;
+        let regular = times
+            .windows(2)
+            .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
+        (regular && spacing > 0.0).then_some(spacing)
     }
 
     /// The smallest median spacing of its channels, s.
@@ -173,12 +212,11 @@ pub(super) fn read(
         let all_have_data = specs.iter().all(|e| e.data.is_some());
         if has_duration || !all_have_data {
             let records = Entry::all(file).map(|entry| {
-                let excitation = excitation::read(&entry, notes)?;
-                let channels = Vec::new();
-                Ok((!excitation.is_empty()).then_some(RawRecord {
-                    channels,
-                    excitation,
-                }))
+                let record = RawRecord {
+                    channels: Vec::new(),
+                    input: excitation::read(&entry, notes)?,
+                };
+                Ok((!record.is_free()).then_some(record))
             });
             return records.collect();
         }
@@ -195,11 +233,11 @@ fn read_one(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<RawRecord, Inp
     let channels = channel::read(entry, notes)?;
     let mut record = RawRecord {
         channels,
-        excitation: excitation::read(entry, notes)?,
+        input: excitation::read(entry, notes)?,
     };
     shared_samples::refuse_input_as_response(entry, &record)?;
     if let Some(channel) = record.channels.first() {
-        record.excitation.share_times(&channel.times);
+        record.input.share_times(&channel.times);
     }
     let next = entry.at.file.spec.experiments.get(entry.number + 1);
     if next.is_none_or(|next| next.data != entry.spec.data) {
@@ -251,7 +289,7 @@ pub(super) fn specification(
         if let Some(delay) = delays::of_input(entry, record.spacing())?.parameter() {
             found = found.input_delay(delay);
         }
-        found = found.input(record.excitation.into_input());
+        found = found.input(record.input);
         for raw in record.channels {
             notes.push(raw.note());
             let delay = delays::of_channel(entry, raw.kind, raw.median_spacing)?;

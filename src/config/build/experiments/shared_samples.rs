@@ -44,7 +44,7 @@ const ROUNDING: f64 = 1e-6;
 /// # Errors
 /// At the response.
 pub fn refuse_input_as_response(entry: &Entry<'_>, record: &RawRecord) -> Result<(), InputError> {
-    let Some((name, signal)) = record.excitation.samples() else {
+    let Some((name, signal)) = record.input_samples() else {
         return Ok(());
     };
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));

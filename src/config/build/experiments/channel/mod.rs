@@ -62,11 +62,6 @@ pub struct RawChannel {
 }
 
 impl RawChannel {
-    /// True for a quadratic loss.
-    pub fn is_squared(&self) -> bool {
-        self.loss == Loss::Squares
-    }
-
     /// Notes for reports.
     pub fn note(&self) -> ChannelNote {
         ChannelNote {
