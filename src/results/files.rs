@@ -4,6 +4,14 @@ use std::io::{self, Write};
 use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
+/// Writes a file; a reader gets the complete old or the complete new one.
+///
+/// # Errors
+/// Errors of the file system; the old file is then unchanged.
+pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
+    write_together(&[(path, contents)])
+}
+
 /// Writes files in their order: none appears before all are written.
 ///
 /// # Errors
