@@ -1,6 +1,6 @@
 //! Data checks of a record.
 
-use super::{Entry, RawChannel, RawRecord, is_equation_error};
+use super::{Entry, RawChannel, RawRecord, is_equation_error, sensor_of};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
 use crate::config::dominant::Oscillation;
@@ -287,13 +287,7 @@ fn opposite_signs(
 
 /// Sign of a sensor's gain; `None` if the gain is estimated.
 fn gain_sign(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
-    let sensors = spec.sensors.as_ref();
-    let sensor = sensors.and_then(|sensors| match kind {
-        ChannelKind::Displacement => sensors.displacement.as_ref(),
-        ChannelKind::Velocity => sensors.velocity.as_ref(),
-        ChannelKind::Acceleration => sensors.acceleration.as_ref(),
-    });
-    match sensor.and_then(|sensor| sensor.gain.as_ref()) {
+    match sensor_of(spec, kind).and_then(|sensor| sensor.gain.as_ref()) {
         None => Some(1.0),
         Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.0.signum()),
         Some(_) => None,
