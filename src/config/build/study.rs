@@ -95,13 +95,19 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let tolerance = (spec.merge_tolerance, SAME);
     let merge_tolerance = within(&at, "merge_tolerance", tolerance, |x| x > 0.0)?;
     check(&at, spec)?;
-    let profiles = each(&at, problem, "profiles", &spec.profiles, target)?;
-    let candidates = each(&at, problem, "candidates", &spec.candidates, candidate)?;
+    let profiles = each(&at, problem, "profiles", spec.profiles.as_deref(), target)?;
+    let candidates = each(
+        &at,
+        problem,
+        "candidates",
+        spec.candidates.as_deref(),
+        candidate,
+    )?;
     let equivalent = each(
         &at,
         problem,
         "equivalent_systems",
-        &spec.equivalent_systems,
+        spec.equivalent_systems.as_deref(),
         equivalent,
     )?;
     Ok(StudyPlan {
@@ -123,10 +129,10 @@ fn each<S, T>(
     at: &Place<'_>,
     problem: &Problem,
     name: &str,
-    list: &Option<Vec<S>>,
+    list: Option<&[S]>,
     read: fn(&Place<'_>, &Problem, &S) -> Result<T, InputError>,
 ) -> Result<Vec<T>, InputError> {
-    let list = list.iter().flatten().enumerate();
+    let list = list.unwrap_or_default().iter().enumerate();
     list.map(|(i, spec)| read(&at.below(&format!("{name}[{i}]")), problem, spec))
         .collect()
 }
