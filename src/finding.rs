@@ -27,6 +27,25 @@ impl Finding {
         }
     }
 
+    /// A finding with the fields of an object as its quantities.
+    pub fn having(kind: &str, text: impl Into<String>, quantities: Value) -> Self {
+        let quantities = match quantities {
+            Value::Object(fields) => fields,
+            _ => Map::new(),
+        };
+        Self {
+            quantities,
+            ..Self::new(kind, text)
+        }
+    }
+
+    /// The finding about a place: a key or an experiment of the model file.
+    #[must_use]
+    pub fn at(mut self, place: &str) -> Self {
+        self.text = format!("{place}: {}", self.text);
+        self.with("place", place)
+    }
+
     /// The finding with another quantity; one that JSON cannot hold is `null`.
     #[must_use]
     pub fn with(mut self, name: &str, value: impl Serialize) -> Self {
@@ -37,22 +56,30 @@ impl Finding {
 
     /// The finding of an enumeration's variant that serialises with its kind as the tag `kind`.
     pub fn of(variant: &impl Serialize, text: impl Into<String>) -> Self {
-        let mut quantities = match serde_json::to_value(variant) {
-            Ok(Value::Object(fields)) => fields,
-            _ => Map::new(),
-        };
-        let kind = quantities.remove("kind");
-        let kind = kind.and_then(|kind| kind.as_str().map(str::to_owned));
-        Self {
-            kind: kind.unwrap_or_default(),
-            quantities,
-            text: text.into(),
-        }
+        let quantities = serde_json::to_value(variant).unwrap_or_default();
+        let mut finding = Self::having("", text, quantities);
+        let kind = finding.quantities.remove("kind");
+        finding.kind = kind
+            .as_ref()
+            .and_then(Value::as_str)
+            .unwrap_or_default()
+            .to_owned();
+        finding
     }
 
     /// The finding of a variant whose sentence is its `Display`.
     pub fn stated(variant: &(impl Serialize + fmt::Display)) -> Self {
         Self::of(variant, variant.to_string())
+    }
+
+    /// A quantity that is a text.
+    pub fn said(&self, name: &str) -> Option<String> {
+        Some(self.quantities.get(name)?.as_str()?.to_owned())
+    }
+
+    /// A quantity that is a number.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.quantities.get(name)?.as_f64()
     }
 
     /// The sentences of findings.

@@ -2,6 +2,14 @@
 
 pub(crate) use kmcfit_core::internals::number_format::{at_most, significant};
 
+/// A number of things: `1 sample`, `3 samples`.
+pub(crate) fn count(number: usize, thing: &str) -> String {
+    match number {
+        1 => format!("1 {thing}"),
+        _ => format!("{number} {thing}s"),
+    }
+}
+
 /// A ratio with one decimal, or four significant digits if it is large.
 pub(crate) fn times_in_words(times: f64) -> String {
     match times < 1e3 {

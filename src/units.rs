@@ -8,6 +8,7 @@ mod spelling;
 use crate::error::InputError;
 use crate::spelling::nearest;
 use crate::text_io::{one_of, quote};
+use kmcfit_core::internals::record::ChannelKind;
 use spelling::{names, product};
 
 /// Measured quantity of a channel.
@@ -23,6 +24,16 @@ pub enum Quantity {
     Force,
     /// Time; SI: s.
     Time,
+}
+
+impl From<ChannelKind> for Quantity {
+    fn from(kind: ChannelKind) -> Self {
+        match kind {
+            ChannelKind::Displacement => Self::Displacement,
+            ChannelKind::Velocity => Self::Velocity,
+            ChannelKind::Acceleration => Self::Acceleration,
+        }
+    }
 }
 
 impl Quantity {

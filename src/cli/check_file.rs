@@ -18,7 +18,8 @@ pub(super) fn run(path: &Path) -> Result<u8, InputError> {
     let reading = Activity::begin(format!("reading {}", path.display()));
     let tables = Table::read_all(path, &TableFormat::default())?;
     drop(reading);
-    let mut text = format!("{}: {}\n", path.display(), format_of(&tables));
+    let format = tables.first().map(Table::format_in_words);
+    let mut text = format!("{}: {}\n", path.display(), format.unwrap_or_default());
     let mut rows = vec![
         ["column", "name", "quantity", "unit", "samples", "rate"]
             .map(str::to_owned)
@@ -55,13 +56,6 @@ pub(super) fn run(path: &Path) -> Result<u8, InputError> {
     let file = shell_quoted(&path.display().to_string());
     print(&format!("{text}`kmcfit init {file}` writes a model file\n"));
     Ok(OK)
-}
-
-fn format_of(tables: &[Table]) -> String {
-    tables
-        .first()
-        .map(Table::format_in_words)
-        .unwrap_or_default()
 }
 
 /// Number, name, quantity, unit, number of samples and sampling rate of a column.

@@ -6,19 +6,17 @@ use super::{
 };
 use crate::config::{BuildMode, Model, ModelFile, Source, Statements, build, is_record, scaffold};
 use crate::error::{InputError, Location};
-use crate::fitting::fit_or_no_response;
+use crate::fitting::{ModelFit, fit_or_no_response};
 use crate::report::document::{FailureDocument, ResultDocument};
 use crate::report::trial::advice;
 use crate::report::{
-    FittedModel, MODEL, OverheadTimings, RequestedFiles, RunAssessment, TimingsSummary, json,
-    model_predictions, summary, summary_plot,
+    CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json, summary,
+    summary_plot,
 };
 use crate::results::{OutputFolder, RESULT};
 use console::Term;
 use kmcfit_core::internals::assessment::VerdictLevel;
-use kmcfit_core::internals::solvers::{
-    Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
-};
+use kmcfit_core::internals::solvers::{IterationEvent, IterationRecord, Observer, Status};
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -236,7 +234,7 @@ pub(super) fn fit_into(
     let clock = Instant::now();
     let full = |error| unwritable(run.folder.shown(), &error);
     run.write(MODEL, file.text.as_bytes()).map_err(full)?;
-    let (model, path, found) = match search(model, progress) {
+    let found = match search(model, progress) {
         Ok(found) => found,
         Err(reason) => {
             run.end(&FailureDocument::new(&model.title, &reason))
@@ -245,24 +243,14 @@ pub(super) fn fit_into(
         }
     };
     file.read_files().check()?;
-    let model = &model;
     let activity = Activity::begin(progress.named_stage("assessing the fit"));
     let analysis = Instant::now();
-    let predictions = model_predictions(model, &found);
-    let run_assessment = RunAssessment::of(model, &found);
+    let found = CompletedFit::of(found);
     let analysis = analysis.elapsed();
     let report = Instant::now();
-    let fitted = FittedModel {
-        run_assessment: &run_assessment,
-        model,
-        fit: &found,
-        predictions: &predictions,
-        weights: path.as_ref(),
-        requested,
-        computed: Default::default(),
-    };
+    let (model, fit, fitted) = (&found.model, &found.fit, found.fitted(requested));
     let mut document = fitted.document_and_figures();
-    document.advice = advice(file, model, &found, &document);
+    document.advice = advice(file, model, fit, &document);
     document.model.folder = run.folder.path_to(run.inside, file.path.parent());
     activity.stage(progress.named_stage("writing the results"));
     let writing = fitted
@@ -275,17 +263,14 @@ pub(super) fn fit_into(
         analysis,
         report: report.elapsed().saturating_sub(writing),
     };
-    let total = (before.total + clock.elapsed()).max(overhead.sum() + found.elapsed);
-    document.timings = TimingsSummary::new(&found, &overhead, total);
+    let total = (before.total + clock.elapsed()).max(overhead.sum() + fit.elapsed);
+    document.timings = TimingsSummary::new(fit, &overhead, total);
     run.end(&document).map_err(full)?;
-    Ok((document, found.outcome.status))
+    Ok((document, fit.outcome.status))
 }
 
 /// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one.
-pub(super) fn search(
-    model: &Model,
-    progress: &Progress,
-) -> Result<(Model, Option<WeightPath>, Fit), String> {
+pub(super) fn search(model: &Model, progress: &Progress) -> Result<ModelFit, String> {
     let (mut ignore, mut show) = (
         |_: &IterationRecord| {},
         |moment: &IterationEvent| progress.show(moment),
@@ -296,9 +281,7 @@ pub(super) fn search(
     }
     let result = fit_or_no_response(model, &mut watch);
     progress.clear();
-    result
-        .map(|found| (found.model, found.weights, found.fit))
-        .map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))
+    result.map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))
 }
 
 #[cfg(test)]

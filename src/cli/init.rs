@@ -6,7 +6,7 @@ use crate::config::{ModelFile, Source, Statements, scaffold};
 use crate::error::InputError;
 use crate::escape::shell_quoted;
 use crate::results::write_together;
-use crate::tables::SAMPLE_RATES;
+use crate::tables::{SAMPLE_RATES, sample_rates};
 use std::path::{Component, Path, PathBuf};
 
 /// Schema file named by the comment in the first line of a model file.
@@ -106,11 +106,7 @@ fn statements(arguments: &Arguments) -> Result<Statements, InputError> {
         return Err(
             InputError::argument("--sample-rate", "invalid sampling rate")
                 .found(format!("{rate:?}"))
-                .expected(format!(
-                    "samples per second, a number from {:e} to {:e}",
-                    SAMPLE_RATES.start(),
-                    SAMPLE_RATES.end()
-                )),
+                .expected(sample_rates()),
         );
     }
     let mut statements = Statements::default();

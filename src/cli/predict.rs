@@ -5,9 +5,7 @@ use super::progress::Activity;
 use super::{CommandError, OK, print, unwritable};
 use crate::config::NewRecord;
 use crate::error::InputError;
-use crate::report::{
-    CsvTable, Figure, ForcedPredictions, FreePredictions, Run, figures, json, render,
-};
+use crate::report::{CsvTable, Figure, ForcedPredictions, FreePredictions, Run, json, render};
 use crate::results::{OutputFolder, read_lock};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
@@ -86,20 +84,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         CommandError::Numerical(format!("--initial: no response: {breakdown}"))
     })?;
     drop((predicting, lock));
-    if let Some(folder) = prepare()? {
-        let unit = if run.document.is_rotation() {
-            "rad"
-        } else {
-            "m"
-        };
-        write(&folder, &run.system.grid.times(), &predictions, unit)
-            .map_err(|error| unwritable(folder.shown(), &error))?;
-    }
-    match arguments.json {
-        true => print(&json(&predictions.summaries())),
-        false => print(&predictions.table()),
-    }
-    Ok(OK)
+    let (summaries, table) = (predictions.summaries(), predictions.table());
+    let curves = || (predictions.csv(), predictions.figure());
+    finish(arguments, prepare()?, curves, &summaries, &table)
 }
 
 /// Opens a run; a model file in its place is answered with the commands that make one.
@@ -146,20 +133,9 @@ fn forced(
     drop((predicting, lock));
     let folder = prepare()?;
     let predictions = found.map_err(CommandError::Numerical)?;
-    if let Some(folder) = folder {
-        write_files(
-            &folder,
-            &predictions.csv(),
-            &predictions.figure(),
-            &predictions.summaries(),
-        )
-        .map_err(|error| unwritable(folder.shown(), &error))?;
-    }
-    match arguments.json {
-        true => print(&json(&predictions.summaries())),
-        false => print(&predictions.table()),
-    }
-    Ok(OK)
+    let (summaries, table) = (predictions.summaries(), predictions.table());
+    let curves = || (predictions.csv(), predictions.figure());
+    finish(arguments, folder, curves, &summaries, &table)
 }
 
 fn state(text: &str) -> Result<State, InputError> {
@@ -178,45 +154,26 @@ fn state(text: &str) -> Result<State, InputError> {
     }
 }
 
-fn write(
-    folder: &OutputFolder,
-    times: &[f64],
-    predictions: &FreePredictions,
-    unit: &str,
-) -> std::io::Result<()> {
-    let mut table = CsvTable::new().column("t_s", times.to_vec());
-    let pairs = predictions.responses.iter().zip(&predictions.bands);
-    for (i, (predicted, band)) in pairs.enumerate() {
-        let header = format!("y_{unit}_{}", i + 1);
-        table = table.column(header, predicted.response.displacement(0).to_vec());
-        for (end, side) in ["low", "high"].into_iter().enumerate() {
-            if let Some(band) = band {
-                let ends = band.iter().map(|ends| ends[end]).collect();
-                table = table.column(format!("y_{side}_95_{unit}_{}", i + 1), ends);
-            }
-        }
-        if let Some(truth) = &predicted.truth {
-            table = table.column(
-                format!("true_y_{unit}_{}", i + 1),
-                truth.displacement(0).to_vec(),
-            );
-        }
-    }
-    write_files(
-        folder,
-        &table,
-        &figures::predictions(times, &predictions.responses),
-        &predictions.summaries(),
-    )
-}
-
-fn write_files(
-    folder: &OutputFolder,
-    table: &CsvTable,
-    figure: &Figure,
+/// Writes predictions into the folder, if one is asked for, and prints them.
+fn finish(
+    arguments: &Arguments,
+    folder: Option<OutputFolder>,
+    curves: impl FnOnce() -> (CsvTable, Figure),
     summaries: &impl Serialize,
-) -> std::io::Result<()> {
-    folder.write("predictions.csv", table.to_csv())?;
-    folder.write("figures/predictions.svg", render(figure))?;
-    folder.commit(&serde_json::json!({"format": 1, "predictions": summaries}))
+    table: &str,
+) -> Result<u8, CommandError> {
+    if let Some(folder) = folder {
+        let write = || {
+            let (curves, figure) = curves();
+            folder.write("predictions.csv", curves.to_csv())?;
+            folder.write("figures/predictions.svg", render(&figure))?;
+            folder.commit(&serde_json::json!({"format": 1, "predictions": summaries}))
+        };
+        write().map_err(|error| unwritable(folder.shown(), &error))?;
+    }
+    match arguments.json {
+        true => print(&json(summaries)),
+        false => print(table),
+    }
+    Ok(OK)
 }

@@ -1,7 +1,7 @@
 //! `kmcfit study`: runs the analyses of a fit.
 
 use super::fit::read;
-use super::study_run::StudyTask;
+use super::study_run::StudyRun;
 use super::{
     CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, stem,
 };
@@ -107,14 +107,7 @@ fn studied(
     flag: Arc<AtomicBool>,
 ) -> Result<StudyDocument, CommandError> {
     let folder = OutputFolder::prepare(out, "study", inputs(file))?;
-    let task = StudyTask {
-        file,
-        model,
-        threads,
-        finished,
-        flag,
-    };
-    task.run(&folder)
+    StudyRun::new(model, threads, finished, flag).write(file, &folder)
 }
 
 /// The model, if its fit simulates a response and has parameters.

@@ -33,66 +33,12 @@ enum StudyError {
     Numerical(String),
 }
 
-/// A study that is to be run.
-pub(super) struct StudyTask<'a> {
-    pub file: &'a ModelFile,
-    pub model: Model,
-    /// Number of threads, at least 1.
-    pub threads: usize,
-    /// The fit and the problem as fitted, if the model was fitted before.
-    pub finished: Option<(StudiedFit, Problem)>,
-    /// Ends the study.
-    pub flag: Arc<AtomicBool>,
-}
-
-impl StudyTask<'_> {
-    /// Runs the study and writes its results; interrupted, those of the finished analyses.
-    pub fn run(self, folder: &OutputFolder) -> Result<StudyDocument, CommandError> {
-        let mut model = self.model;
-        model.settings.interrupt = Some(Arc::clone(&self.flag));
-        let document = StudyDocument {
-            format: 1,
-            title: model.title.clone(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            status: "interrupted".into(),
-            confidence: model.study.confidence,
-            seed: model.study.seed,
-            structural_rank: structural_rank(&model.problem),
-            ..StudyDocument::default()
-        };
-        let threads = self.threads;
-        let (finished, fitted) = self.finished.unzip();
-        let mut work = StudyRun {
-            model: Arc::new(model),
-            finished,
-            fitted,
-            flag: self.flag,
-            threads,
-            begun: 1,
-            document,
-        };
-        let done = match work.run() {
-            Ok(()) => true,
-            Err(StudyError::Interrupted) => false,
-            Err(StudyError::Numerical(reason)) => return Err(CommandError::Numerical(reason)),
-        };
-        let mut document = work.document;
-        if done {
-            document.status = COMPLETE.into();
-        }
-        self.file.read_files().check()?;
-        let written = document.write(folder, &work.model);
-        written.map_err(|error| unwritable(folder.shown(), &error))?;
-        Ok(document)
-    }
-}
-
-/// A running study.
-struct StudyRun {
+/// A study: its analyses write into one document.
+pub(super) struct StudyRun {
     /// The model; after the fit on the grid of the fit.
     model: Arc<Model>,
-    /// The fit of a finished run.
-    finished: Option<StudiedFit>,
+    /// The fit of a finished run, with its problem.
+    finished: Option<(StudiedFit, Problem)>,
     /// The problem as fitted, with the noise of the fit.
     fitted: Option<Problem>,
     flag: Arc<AtomicBool>,
@@ -103,6 +49,52 @@ struct StudyRun {
 }
 
 impl StudyRun {
+    /// A study with at most `threads` threads that ends early if `flag` is set. A finished fit is not repeated.
+    pub fn new(
+        mut model: Model,
+        threads: usize,
+        finished: Option<(StudiedFit, Problem)>,
+        flag: Arc<AtomicBool>,
+    ) -> Self {
+        model.settings.interrupt = Some(Arc::clone(&flag));
+        let document = StudyDocument {
+            format: 1,
+            title: model.title.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            status: "interrupted".into(),
+            confidence: model.study.confidence,
+            seed: model.study.seed,
+            structural_rank: structural_rank(&model.problem),
+            ..StudyDocument::default()
+        };
+        Self {
+            model: Arc::new(model),
+            finished,
+            fitted: None,
+            flag,
+            threads,
+            begun: 1,
+            document,
+        }
+    }
+
+    /// Runs all analyses and writes the study, complete or not, into the folder.
+    pub fn write(
+        mut self,
+        file: &ModelFile,
+        folder: &OutputFolder,
+    ) -> Result<StudyDocument, CommandError> {
+        match self.run() {
+            Ok(()) => self.document.status = COMPLETE.into(),
+            Err(StudyError::Interrupted) => {}
+            Err(StudyError::Numerical(reason)) => return Err(CommandError::Numerical(reason)),
+        }
+        file.read_files().check()?;
+        let written = self.document.write(folder, &self.model);
+        written.map_err(|error| unwritable(folder.shown(), &error))?;
+        Ok(self.document)
+    }
+
     /// All analyses, up to an interrupt.
     fn run(&mut self) -> Result<(), StudyError> {
         let (problem, theta, evaluation) = self.fit()?;
@@ -112,13 +104,12 @@ impl StudyRun {
             evaluation: &evaluation,
         };
         self.at_the_optimum(at)?;
-        self.further_fits(at)?;
         self.extremes(at)
     }
 
-    /// Analyses of the linearised fit, profiles, candidate experiments and equivalent systems.
+    /// Analyses of the linearised fit, profiles, candidate experiments, equivalent systems, and fits from random starting points.
     fn at_the_optimum(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let model = Arc::clone(&self.model);
+        let (model, threads) = (Arc::clone(&self.model), self.threads);
         let plan = &model.study;
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
         // The intervals of the fit are those with its correlation of the noise.
@@ -139,9 +130,10 @@ impl StudyRun {
             };
             let profile = || study::profile_of(at, &of, &model);
             let name = format!("profile of {}", of.name);
-            let found = self.analysis(&name, profile)?;
-            let found = self.or_fail(&name, found);
-            self.document.profiles.extend(found);
+            match self.analysis(&name, profile)? {
+                Ok(found) => self.document.profiles.push(found),
+                Err(reason) => self.fail(&name, &reason),
+            }
         }
         if !plan.candidates.is_empty() {
             let candidates = || study::candidates(at, &plan.candidates);
@@ -149,13 +141,6 @@ impl StudyRun {
         }
         let equivalent = || study::equivalent(at, &plan.equivalent_systems);
         self.document.equivalent_systems = self.analysis("equivalent systems", equivalent)?;
-        Ok(())
-    }
-
-    /// Further fits, from random starting points.
-    fn further_fits(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let (model, threads) = (Arc::clone(&self.model), self.threads);
-        let plan = &model.study;
         if plan.starts > 0 {
             let starts = || study::starts(&model, at, threads);
             self.document.multistart = Some(self.analysis("starts", starts)?);
@@ -207,11 +192,6 @@ impl StudyRun {
         Ok(found)
     }
 
-    /// The result of an analysis; its failure is noted in the document.
-    fn or_fail<T>(&mut self, what: &str, found: Result<T, String>) -> Option<T> {
-        found.map_err(|reason| self.fail(what, &reason)).ok()
-    }
-
     fn fail(&mut self, what: &str, reason: &str) {
         self.document.failures.push(AnalysisFailure {
             analysis: what.to_owned(),
@@ -225,15 +205,17 @@ impl StudyRun {
         let shown = format!("study 1/{}: fit", model.study.analyses());
         let progress = Progress::new(&shown);
         let fit = match self.finished.take() {
-            Some(finished) => finished,
+            Some((finished, problem)) => {
+                self.fitted = Some(problem);
+                finished
+            }
             None => {
-                let (fitted, _, found) =
-                    search(&model, &progress).map_err(StudyError::Numerical)?;
-                let fit = StudiedFit::of(&fitted, &found);
-                self.fitted = Some(fitted.problem.clone());
+                let found = search(&model, &progress).map_err(StudyError::Numerical)?;
+                let fit = StudiedFit::of(&found.model, &found.fit);
+                self.fitted = Some(found.model.problem.clone());
                 // A fit that finds jumps has other parameters than its model.
-                if fitted.problem.parameters() != model.problem.parameters() {
-                    model = Arc::new(fitted);
+                if found.model.problem.parameters() != model.problem.parameters() {
+                    model = Arc::new(found.model);
                 }
                 fit
             }

@@ -26,7 +26,6 @@ mod syntax;
 pub mod values;
 mod yaml_errors;
 
-pub(crate) use build::DataWarning;
 pub use build::{
     AutomaticGrid, BuildMode, ChannelNote, HoldOut, Model, Preparation, StudyPlan, StudyTarget,
     WeightSearch, build,

@@ -52,8 +52,6 @@ impl FleetIdentity {
 pub struct FleetFolder {
     /// Its path.
     pub path: PathBuf,
-    /// Its model.
-    pub identity: FleetIdentity,
     file: RowFile,
     rows: HashMap<String, Row>,
 }
@@ -92,7 +90,6 @@ impl FleetFolder {
         })?;
         Ok(Self {
             path: path.to_path_buf(),
-            identity,
             file,
             rows,
         })

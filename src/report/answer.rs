@@ -1,10 +1,11 @@
 //! The answer of a fit as a table: estimates with their confidence intervals, units and status.
 
+use super::columns::kind_named;
 use super::document::{ResultDocument, Verdict};
 use super::ratios;
+use super::text::aligned_to;
 use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
-use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 
 /// Half-width of an interval, relative to the estimate, below which it is not printed: samples without noise.
@@ -137,7 +138,7 @@ fn status(document: &ResultDocument, estimate: &Estimate) -> String {
         EstimateStatus::Estimated if !estimate.value.is_finite() => "not defined".to_owned(),
         _ if is_not_unique(document, estimate) => "not unique".to_owned(),
         EstimateStatus::Estimated => "estimated".to_owned(),
-        EstimateStatus::Fixed => match others_scale(document) {
+        EstimateStatus::Fixed => match fixed_name(document).is_some() {
             true => "fixed; the others scale with it".to_owned(),
             false => "fixed".to_owned(),
         },
@@ -157,10 +158,6 @@ fn is_not_unique(document: &ResultDocument, estimate: &Estimate) -> bool {
     is_estimated
         && document.cost.regularisation == 0.0
         && document.verdict.as_ref().is_some_and(is_deficient)
-}
-
-fn others_scale(document: &ResultDocument) -> bool {
-    fixed_name(document).is_some()
 }
 
 /// Name of the fixed function that determines the scale of all others.
@@ -198,8 +195,7 @@ pub fn quantity(name: &str) -> String {
         Some((first, owner)) if first != "known part" => (first, format!(" of {owner}")),
         _ => (name, String::new()),
     };
-    let kind = CoefficientKind::ALL.into_iter().find(|k| k.name() == first);
-    match kind {
+    match kind_named(first) {
         Some(kind) => format!("{} {}{owner}", in_words(first), kind.symbol()),
         None => name.replace('_', " "),
     }
@@ -213,27 +209,11 @@ pub fn in_words(name: &str) -> String {
 /// The table as text.
 pub fn answer_table(document: &ResultDocument) -> String {
     let rows = answer(document);
-    let widths = |of: &dyn Fn(&AnswerRow) -> &str, heading: &str| {
-        let cells = rows.iter().map(|row| of(row).chars().count());
-        cells.chain([heading.chars().count()]).max().unwrap_or(0)
-    };
-    let quantity = widths(&|r| &r.quantity, "");
-    let estimate = widths(&|r| &r.estimate, "estimate");
-    let interval = widths(&|r| &r.interval, "95 % CI");
-    let unit = widths(&|r| &r.unit, "unit");
-    let line = |[q, e, i, u, s]: [&str; 5]| {
-        let text = format!("{q:<quantity$}  {e:>estimate$}  {i:<interval$}  {u:<unit$}  {s}");
-        text.trim_end().to_owned() + "\n"
-    };
-    let mut text = line(["", "estimate", "95 % CI", "unit", "status"]);
-    for row in &rows {
-        text += &line([
-            &row.quantity,
-            &row.estimate,
-            &row.interval,
-            &row.unit,
-            &row.status_and_range(),
-        ]);
-    }
-    text
+    let headings = ["", "estimate", "95 % CI", "unit", "status"].map(str::to_owned);
+    let cells = rows.into_iter().map(|row| {
+        let status = row.status_and_range();
+        vec![row.quantity, row.estimate, row.interval, row.unit, status]
+    });
+    let rows: Vec<Vec<String>> = [headings.to_vec()].into_iter().chain(cells).collect();
+    aligned_to(&rows, |column| column == 1)
 }

@@ -137,7 +137,7 @@ impl ChannelView<'_> {
 }
 
 /// A text with a capital letter and a full stop.
-fn sentence(text: &str) -> String {
+pub(super) fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     match letters.next() {
         None => String::new(),

@@ -9,6 +9,11 @@ pub(super) fn interval_columns(column: &str) -> [String; 2] {
 }
 
 /// Header of a quantity.
+pub(super) fn kind_named(name: &str) -> Option<CoefficientKind> {
+    let mut kinds = CoefficientKind::ALL.into_iter();
+    kinds.find(|kind| kind.name() == name)
+}
+
 pub(super) fn quantity_column(quantity: CoefficientKind, is_rotation: bool) -> &'static str {
     match is_rotation {
         true => quantity.angular_column(),
@@ -54,10 +59,7 @@ pub(super) fn named_column(name: &str, is_rotation: bool) -> Option<String> {
         Some((kind, owner)) => (kind, Some(owner)),
         None => (whole, None),
     };
-    let quantity = CoefficientKind::ALL
-        .into_iter()
-        .find(|q| q.name() == kind)?;
-    let column = quantity_column(quantity, is_rotation);
+    let column = quantity_column(kind_named(kind)?, is_rotation);
     Some(column_of_part(column, part.is_some(), owner))
 }
 

@@ -55,13 +55,10 @@ impl CompletedFit {
     /// The fit with the files that are requested.
     pub fn fitted(&self, requested: RequestedFiles) -> FittedModel<'_> {
         FittedModel {
-            model: &self.model,
-            fit: &self.fit,
             predictions: &self.predictions,
             weights: self.weights.as_ref(),
-            run_assessment: &self.assessment,
             requested,
-            computed: Default::default(),
+            ..FittedModel::new(&self.model, &self.fit, &self.assessment)
         }
     }
 

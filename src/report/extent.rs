@@ -2,8 +2,7 @@
 
 use super::document::ResultDocument;
 use super::suggestions::percent;
-use super::text::count;
-use crate::number_format::significant;
+use crate::number_format::{count, significant};
 use kmcfit_core::internals::assessment::POOR;
 
 /// Number of samples, of several records with their number, and duration, of several records the longest; samples for validation apart.

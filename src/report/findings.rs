@@ -2,7 +2,7 @@
 
 use super::text::and_list;
 use crate::finding::Finding;
-use crate::number_format::{resolved, significant, times_in_words};
+use crate::number_format::{count, resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
     ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, NoIntervals, RecordError,
     Unidentified,
@@ -104,11 +104,11 @@ pub fn jumps(name: &str, unit: &str, times: &[f64], levels: &[(f64, Option<[f64;
         }
         None => format!("{} {unit}", significant(*value, 4)),
     };
-    let mut text = match times.len() {
-        0 => format!("no jump of {name} found: "),
-        1 => format!("1 jump of {name} found: "),
-        count => format!("{count} jumps of {name} found: "),
+    let jumps = match times.len() {
+        0 => "no jump".to_owned(),
+        some => count(some, "jump"),
     };
+    let mut text = format!("{jumps} of {name} found: ");
     for (i, each) in levels.iter().enumerate() {
         if i > 0 {
             text += &format!("; from {} s ", significant(times[i - 1], 5));
@@ -354,15 +354,12 @@ pub fn record_error(error: &RecordError) -> String {
         ),
         RecordError::InputPulses {
             experiment,
-            count,
+            count: pulses,
             time,
             error,
         } => format!(
             "the force of {experiment} has errors at {}, as by spikes, cut peaks or unmeasured impacts, the largest of about {} N near {} s",
-            match count {
-                1 => "1 sample".to_owned(),
-                _ => format!("{count} samples"),
-            },
+            count(*pulses, "sample"),
             significant(*error, 2),
             significant(*time, 6)
         ),

@@ -299,7 +299,12 @@ impl FittedModel<'_> {
         let panels = panels.map(|(i, (function, found))| {
             let name = format!("{} {}", function.name(), function.quantity.symbol());
             let (found, start) = (rows(&found), rows(&starts[i]));
-            let truth = self.true_function(i).map(rows);
+            let truth = self
+                .model
+                .truth
+                .as_ref()
+                .and_then(|truth| truth.functions().nth(i));
+            let truth = truth.map(rows);
             let curve = FunctionCurve {
                 band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
                 start: Some(&start),

@@ -69,7 +69,6 @@ pub use prediction::{ForcedPredictions, ForcedSummary, FreePredictions, Score};
 pub use result_table::ResultTable;
 pub use run::{FittedModel, MODEL, RequestedFiles, json};
 pub use run_reader::Run;
-pub(crate) use summary::count;
 pub use summary::{prediction_table, summary};
 pub use terminal::summary_plot;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};

@@ -17,10 +17,9 @@ pub(super) fn unknown_mass(model: &Model) -> Option<Finding> {
 /// The units that neither the model nor a file states.
 pub(super) fn assumed_units(model: &Model) -> Option<Finding> {
     let units = &model.assumed_units;
-    let text = |name: &str, unit: &Finding| unit.quantities.get(name)?.as_str().map(str::to_owned);
     let each = units.iter().filter_map(|unit| {
-        let quantity = text("quantity", unit)?.replace('_', " ");
-        Some(format!("{quantity} in {}", text("unit", unit)?))
+        let quantity = unit.said("quantity")?.replace('_', " ");
+        Some(format!("{quantity} in {}", unit.said("unit")?))
     });
     let mut each: Vec<String> = each.collect();
     each.sort();

@@ -1,7 +1,7 @@
 //! Figures of one record: residual tests, spectra, frequency response and input.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use super::text::count;
+use crate::number_format::count;
 use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use kmcfit_core::internals::signal::{Mobility, Spectrum};
 

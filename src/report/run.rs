@@ -92,6 +92,21 @@ impl Model {
     }
 }
 
+impl<'a> FittedModel<'a> {
+    /// A fit without predictions, a choice of the weight and requested files.
+    pub(super) fn new(model: &'a Model, fit: &'a Fit, run_assessment: &'a RunAssessment) -> Self {
+        Self {
+            model,
+            fit,
+            predictions: &[],
+            weights: None,
+            run_assessment,
+            requested: RequestedFiles::default(),
+            computed: Computed::default(),
+        }
+    }
+}
+
 impl FittedModel<'_> {
     /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
     /// the elapsed time multiplied by the share of writing in the working time of the threads.
@@ -369,10 +384,6 @@ impl FittedModel<'_> {
         let functions = &self.model.problem.functions;
         let values = functions.values(&self.fit.best.parameters);
         functions.iter().zip(values).collect()
-    }
-
-    pub(super) fn true_function(&self, index: usize) -> Option<&[f64]> {
-        self.model.truth.as_ref()?.functions().nth(index)
     }
 
     fn experiment_summaries(&self) -> Vec<ExperimentSummary> {

@@ -2,17 +2,16 @@
 
 use super::answer::answer_table;
 use super::document::{
-    ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
+    AttemptSummary, ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
 };
 use super::equation::equation_residual;
 use super::extent::{extent, validation};
 use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
-use super::suggestions;
-pub(crate) use super::text::count;
+use super::suggestions::percent;
 use crate::finding::Finding;
-use crate::number_format::{resolved, significant};
+use crate::number_format::{count, resolved, significant};
 use kmcfit_core::internals::assessment::ClassicalEstimate;
 use kmcfit_core::internals::functions::WeightRule;
 use std::fmt::Write;
@@ -23,11 +22,9 @@ const UNSHARP: f64 = 0.2;
 /// The summary of a fit: verdict, estimates, fit of the samples, advice; `verbose` adds the end of the search, all findings, the
 /// nuisance parameters and the constraints. `plot` stands below the estimates.
 pub fn summary(document: &ResultDocument, verbose: bool, plot: Option<&str>) -> String {
-    let mut text = String::new();
-    // Writing to a String cannot fail.
-    let _ = write_answer(&mut text, document, plot);
+    let mut text = answer(document, plot);
     if verbose {
-        let _ = write_details(&mut text, document);
+        text += &details(document);
     }
     if !document.predictions.is_empty() {
         let table = prediction_table(&document.predictions, document.is_rotation());
@@ -36,23 +33,27 @@ pub fn summary(document: &ResultDocument, verbose: bool, plot: Option<&str>) -> 
     text
 }
 
+/// Sentences below one another, the first of each list beside its heading.
+fn under_headings<const N: usize>(lists: [(&str, Vec<String>); N], width: usize) -> String {
+    let lists = lists.into_iter().flat_map(|(heading, sentences)| {
+        let headings = std::iter::once(heading).chain(std::iter::repeat(""));
+        let lines = headings.zip(sentences);
+        lines.map(|(heading, sentence)| format!("{heading:<width$} {sentence}\n"))
+    });
+    lists.collect()
+}
+
 /// The answer: title, verdict, estimates, fit, warnings about the data, advice.
-fn write_answer(
-    text: &mut String,
-    document: &ResultDocument,
-    plot: Option<&str>,
-) -> std::fmt::Result {
-    writeln!(text, "{}: {}", document.title, extent(document))?;
+fn answer(document: &ResultDocument, plot: Option<&str>) -> String {
+    let mut text = format!("{}: {}\n", document.title, extent(document));
     if let Some(verdict) = &document.verdict {
-        writeln!(text, "{}", verdict.lines())?;
+        text += &format!("{}\n", verdict.lines());
     }
     if !document.estimates.is_empty() {
-        write!(text, "\n{}", answer_table(document))?;
+        text += &format!("\n{}", answer_table(document));
     }
-    writeln!(text)?;
-    if let Some(plot) = plot {
-        writeln!(text, "{plot}")?;
-    }
+    text += "\n";
+    text += &plot.map_or(String::new(), |plot| format!("{plot}\n"));
     let lists = [
         ("Mass", assumed(document, MASS_UNKNOWN)),
         ("Units", assumed(document, UNITS_ASSUMED)),
@@ -61,13 +62,7 @@ fn write_answer(
         ("Data", data_lines(document)),
         ("Next", Finding::texts(&document.advice)),
     ];
-    for (heading, sentences) in lists {
-        for (i, sentence) in sentences.iter().enumerate() {
-            let heading = if i == 0 { heading } else { "" };
-            writeln!(text, "{heading:<6} {sentence}")?;
-        }
-    }
-    Ok(())
+    text + &under_headings(lists, 6)
 }
 
 /// Assumptions of a kind.
@@ -104,42 +99,46 @@ fn truth(document: &ResultDocument) -> Option<String> {
 }
 
 /// End of the search, cost and work, findings, nuisance parameters, constraints and attempts.
-fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let cost = &document.cost;
-    let outcome = &document.outcome;
-    writeln!(text, "\n{}: {}", outcome.status.name(), outcome.reason)?;
-    write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
-    if document.has_ratio() {
-        write!(text, ", J/J0 {:.4e}", cost.ratio)?;
-    }
-    let counts = &document.counts;
+fn details(document: &ResultDocument) -> String {
+    let (cost, outcome, counts) = (&document.cost, &document.outcome, &document.counts);
+    let ratio = match document.estimates_sigma() {
+        true => String::new(),
+        false => format!(", J/J0 {:.4e}", cost.ratio),
+    };
     let (others, what) = match (counts.adjoint, counts.tangent) {
         (0, tangent @ 1..) => (tangent, "tangent"),
         (adjoint, _) => (adjoint, "adjoint"),
     };
-    writeln!(
-        text,
-        "; {}, {} forward and {}, {:.2} s",
+    let mut text = format!(
+        "\n{}: {}\nJ {:.6e} -> {:.6e}{ratio}; {}, {} forward and {}, {:.2} s\n",
+        outcome.status.name(),
+        outcome.reason,
+        cost.initial,
+        cost.r#final,
         count(counts.iterations as usize, "iteration"),
         counts.forward,
         count(others as usize, &format!("{what} solve")),
         document.seconds
-    )?;
-    let assumed = document.verdict.iter().flat_map(|v| v.assumptions.clone());
-    let assumed: Vec<Finding> = assumed.collect();
-    for (heading, findings) in [
-        ("Assumptions", assumed.iter().collect()),
-        ("Identifiability", document.notes().collect::<Vec<_>>()),
-        ("Warnings", document.fit_warnings().collect()),
-    ] {
-        for (i, finding) in findings.iter().enumerate() {
-            let heading = if i == 0 { heading } else { "" };
-            writeln!(text, "{heading:<15} {finding}")?;
-        }
-    }
-    write_nuisance_parameters(text, &document.nuisance_parameters)?;
-    write_constraints(text, document)?;
-    write_attempts(text, document)
+    );
+    let assumptions = document.verdict.iter();
+    let assumptions = assumptions.flat_map(|v| Finding::texts(&v.assumptions));
+    let lists = [
+        ("Assumptions", assumptions.collect()),
+        (
+            "Identifiability",
+            document.notes().map(Finding::to_string).collect(),
+        ),
+        (
+            "Warnings",
+            document.fit_warnings().map(Finding::to_string).collect(),
+        ),
+    ];
+    text += &under_headings(lists, 15);
+    let parameters = nuisance_parameters(&document.nuisance_parameters).into_iter();
+    let lines = parameters
+        .chain(constraints(document))
+        .chain(attempts(document));
+    lines.fold(text, |text, line| text + &line + "\n")
 }
 
 /// Fit of the channel or of the worst one, or for the equation error its residual; rejected outliers and the fit of the validation records.
@@ -155,12 +154,12 @@ fn fit(document: &ResultDocument) -> Vec<String> {
         }
         (None, [only]) => format!(
             "{} of {}; residual {} {} rms",
-            fit_percent(worst),
+            percent(worst, 2),
             only.kind,
             significant(only.rms_residual, 3),
             only.unit
         ),
-        (None, _) => format!("{} for the worst channel", fit_percent(worst)),
+        (None, _) => format!("{} for the worst channel", percent(worst, 2)),
     };
     let outliers = channels.iter().map(|c| c.outliers).sum::<usize>();
     if outliers > 0 {
@@ -179,95 +178,79 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     std::iter::once(text).chain(classical).collect()
 }
 
-fn fit_percent(fit: f64) -> String {
-    suggestions::percent(fit, 2)
-}
-
-/// Nuisance parameters with their confidence intervals.
-pub(super) fn write_nuisance_parameters(
-    text: &mut String,
-    parameters: &[NuisanceParameter],
-) -> std::fmt::Result {
-    for parameter in parameters {
+/// Nuisance parameters with their intervals.
+pub(super) fn nuisance_parameters(parameters: &[NuisanceParameter]) -> Vec<String> {
+    let line = |parameter: &NuisanceParameter| {
         let (name, unit) = (&parameter.name, &parameter.unit);
         match parameter.half_width() {
             Some(half) => {
                 let (low, high) = (parameter.value - half, parameter.value + half);
                 let [value, low, high] = resolved([parameter.value, low, high], half);
-                writeln!(text, "{name} = {value} {unit} (95 % CI {low} to {high})")?;
+                format!("{name} = {value} {unit} (95 % CI {low} to {high})")
             }
-            None => writeln!(text, "{name} = {} {unit}", significant(parameter.value, 6))?,
+            None => format!("{name} = {} {unit}", significant(parameter.value, 6)),
         }
-    }
-    Ok(())
+    };
+    parameters.iter().map(line).collect()
 }
 
-pub(super) fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+/// Choice of the weight, effective parameters, violated soft constraints and active constraints.
+pub(super) fn constraints(document: &ResultDocument) -> Vec<String> {
+    let mut lines = Vec::new();
     if let Some(weights) = &document.weights {
         let (rule, weight) = (rule_in_words(&weights.rule), weights.weight);
-        write!(text, "penalty weight by {rule}: {weight:.3e}")?;
         let of_rule = |p: &&PenaltySummary| p.rule.as_ref() == Some(&weights.rule);
         let penalties = document.penalties.iter().filter(of_rule);
         let mut functions: Vec<&str> = penalties.map(|p| p.function.as_str()).collect();
         functions.dedup();
-        match functions.len() {
-            0 | 1 => writeln!(text)?,
-            _ => writeln!(text, " (the same factor for {})", functions.join(", "))?,
-        }
-        if let Some(remark) = &weights.remark {
-            writeln!(text, "{remark}")?;
-        }
+        let of = match functions.len() {
+            0 | 1 => String::new(),
+            _ => format!(" (the same factor for {})", functions.join(", ")),
+        };
+        lines.push(format!("penalty weight by {rule}: {weight:.3e}{of}"));
+        lines.extend(weights.remark.clone());
     }
-    for penalty in &document.penalties {
-        let rule = penalty.rule.as_deref();
-        if rule == Some(WeightRule::RestrictedLikelihood.name()) {
-            let of = match penalty.effective_parameters {
-                Some(effective) => format!(
-                    ": {effective:.1} effective parameters of {}",
-                    penalty.parameters
-                ),
-                None => String::new(),
-            };
-            writeln!(text, "smoothness of {} by reml{of}", penalty.function)?;
-        }
+    let reml = Some(WeightRule::RestrictedLikelihood.name());
+    for penalty in (document.penalties.iter()).filter(|p| p.rule.as_deref() == reml) {
+        let of = penalty.effective_parameters.map_or(String::new(), |found| {
+            format!(
+                ": {found:.1} effective parameters of {}",
+                penalty.parameters
+            )
+        });
+        lines.push(format!("smoothness of {} by reml{of}", penalty.function));
     }
     for slack in &document.constraints.slack {
-        writeln!(
-            text,
-            "soft constraint `{}` is violated by up to {:.3e} on {}",
-            slack.name,
-            slack.largest,
-            count(slack.rows, "row")
-        )?;
+        let (name, largest) = (&slack.name, slack.largest);
+        let rows = count(slack.rows, "row");
+        lines.push(format!(
+            "soft constraint `{name}` is violated by up to {largest:.3e} on {rows}"
+        ));
     }
-    for active in &document.constraints.active {
-        writeln!(text, "{}", active.text)?;
-    }
-    Ok(())
+    lines.extend(document.constraints.active.iter().map(|a| a.text.clone()));
+    lines
 }
 
-/// The attempts, if there is more than one.
-pub(super) fn write_attempts(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+/// The attempts from several starts; none if there was one.
+pub(super) fn attempts(document: &ResultDocument) -> Vec<String> {
     if document.attempts.len() < 2 {
-        return Ok(());
+        return Vec::new();
     }
     let with = match document.estimates_sigma() {
         true => " (before sigma is estimated)",
         false => "",
     };
-    for attempt in &document.attempts {
-        let cost = attempt
-            .cost
-            .map_or("no response".into(), |cost| format!("J {cost:.4e}{with}"));
-        writeln!(
-            text,
-            "attempt from the {}: {cost} after {} ({})",
+    let line = |attempt: &AttemptSummary| {
+        let cost = attempt.cost.map(|cost| format!("J {cost:.4e}{with}"));
+        format!(
+            "attempt from the {}: {} after {} ({})",
             attempt.start,
+            cost.unwrap_or_else(|| "no response".into()),
             count(attempt.iterations as usize, "iteration"),
             attempt.status.name()
-        )?;
-    }
-    Ok(())
+        )
+    };
+    document.attempts.iter().map(line).collect()
 }
 
 /// Predictions as a table: the initial state and, if the true system is known, the cost relative to its response and the

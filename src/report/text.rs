@@ -106,14 +106,6 @@ pub(crate) fn prose(text: &str) -> String {
     parts.collect()
 }
 
-/// A count with its noun in the singular or plural.
-pub fn count(number: usize, thing: &str) -> String {
-    match number {
-        1 => format!("1 {thing}"),
-        _ => format!("{number} {thing}s"),
-    }
-}
-
 /// `a, b and c`.
 pub fn and_list(names: &[String]) -> String {
     match names {
@@ -125,12 +117,23 @@ pub fn and_list(names: &[String]) -> String {
 
 /// Rows in columns of equal width, with two blanks between them.
 pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
-    let columns = rows.first().map_or(0, Vec::len);
-    let width = |j: usize| rows.iter().map(|row| row[j].chars().count()).max();
-    let widths: Vec<usize> = (0..columns).filter_map(width).collect();
+    aligned_to(rows, |_| false)
+}
+
+/// Rows of text with the cells of each column below one another, those of some columns at its right end.
+pub(super) fn aligned_to(rows: &[Vec<String>], is_right: impl Fn(usize) -> bool) -> String {
+    let width = |j: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(j));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    };
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
     let line = |row: &Vec<String>| {
-        let cells = row.iter().zip(&widths);
-        let cells = cells.map(|(cell, width)| format!("{cell:<width$}"));
+        let cells = row.iter().enumerate();
+        let cells = cells.map(|(j, cell)| match (is_right(j), widths[j]) {
+            (true, width) => format!("{cell:>width$}"),
+            (false, width) => format!("{cell:<width$}"),
+        });
         cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
     };
     rows.iter().map(line).collect()

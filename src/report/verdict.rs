@@ -1,15 +1,13 @@
 //! Reasons of the verdict on a fit in words, each a clause of one line.
 
 use super::document::{Estimates, Verdict};
-use super::fit_assessment::{RunAssessment, ValidationRecord};
+use super::fit_assessment::ValidationRecord;
 use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;
 use super::rivals::{rival_in_words, term_in_words};
 use super::run::FittedModel;
-use super::run::RequestedFiles;
 use super::suggestions::percent;
 use super::text::and_list;
-use crate::config::{DataWarning, Model};
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
@@ -17,24 +15,25 @@ use kmcfit_core::internals::assessment::{
     VerdictReason, estimates, verdict_assumptions, verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::solvers::{EquationBalance, Fit, Status};
+use kmcfit_core::internals::solvers::{EquationBalance, Status};
 use std::collections::BTreeMap;
 
-impl FittedModel<'_> {
-    /// Verdict on a fit of a model.
-    pub(super) fn verdict_of(model: &Model, fit: &Fit) -> Verdict {
-        let fitted = FittedModel {
-            model,
-            fit,
-            predictions: &[],
-            weights: None,
-            run_assessment: &RunAssessment::of(model, fit),
-            requested: RequestedFiles::default(),
-            computed: Default::default(),
-        };
-        fitted.verdict()
-    }
+/// Kinds of the warnings on what a file states of units and scales.
+const STATED_UNITS: [&str; 4] = [
+    "scale_not_applied",
+    "unknown_unit",
+    "unit_of_name_unused",
+    "volts",
+];
+/// Kinds of the warnings that show a wrong unit by the samples.
+const DOUBTFUL_UNITS: [&str; 4] = [
+    "implausible_magnitudes",
+    "mains_hum",
+    "suspicious_factor",
+    "suspicious_mass",
+];
 
+impl FittedModel<'_> {
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
     pub(super) fn verdict(&self) -> Verdict {
         let problem = &self.model.problem;
@@ -47,25 +46,21 @@ impl FittedModel<'_> {
             reasons.retain(|reason| !matches!(reason, VerdictReason::OnlyRatios));
         }
         // Codes in place of samples are no motion.
-        let has_codes = self
-            .model
-            .warnings
-            .iter()
-            .any(|w| w.kind == "missing_codes");
+        let warnings = &self.model.warnings;
+        let has_codes = warnings.iter().any(|w| w.kind == "missing_codes");
         let implausible = self.implausible().filter(|_| !has_codes);
         reasons.extend(implausible.map(VerdictReason::ImplausibleUnits));
         let has_units = |r: &VerdictReason| matches!(r, VerdictReason::ImplausibleUnits(_));
         // Implausible magnitudes are a reason already; what the file states is one in any case.
         let doubtful = |kinds: &[&str]| -> Vec<&str> {
-            let of_kind = (self.model.warnings.iter()).filter(|w| kinds.contains(&w.kind.as_str()));
-            of_kind
-                .filter_map(|w| Some(w.text.split_once(": ")?.1))
-                .collect()
+            let of_kind = warnings.iter().filter(|w| kinds.contains(&w.kind.as_str()));
+            let texts = of_kind.filter_map(|w| Some(w.text.split_once(": ")?.1));
+            texts.collect()
         };
-        let mut doubts = doubtful(&DataWarning::STATED_UNITS);
+        let mut doubts = doubtful(&STATED_UNITS);
         doubts.dedup();
         if doubts.is_empty() && !reasons.iter().any(has_units) {
-            doubts = doubtful(&DataWarning::DOUBTFUL_UNITS);
+            doubts = doubtful(&DOUBTFUL_UNITS);
             doubts.truncate(1);
         }
         if !doubts.is_empty() {
@@ -78,10 +73,10 @@ impl FittedModel<'_> {
         }
         let has_mode = |r: &VerdictReason| matches!(r, VerdictReason::SecondMode { .. });
         if !reasons.iter().any(has_mode) {
-            reasons.extend(self.model.warnings.iter().find_map(two_modes));
+            reasons.extend(warnings.iter().find_map(two_modes));
         }
-        reasons.extend(self.model.warnings.iter().filter_map(repeated_record));
-        let faults: BTreeMap<String, VerdictReason> = (self.model.warnings.iter())
+        reasons.extend(warnings.iter().filter_map(repeated_record));
+        let faults: BTreeMap<String, VerdictReason> = (warnings.iter())
             .filter_map(faulty_samples)
             .map(|reason| (format!("{reason:?}"), reason))
             .collect();
@@ -154,14 +149,9 @@ impl FittedModel<'_> {
             shares.reduce(f64::min)
         };
         self.model.data.iter().filter_map(move |fact| {
-            let text = |name: &str| Some(fact.quantities.get(name)?.as_str()?.to_owned());
-            let is_input = fact.kind == "quantisation" && text("action")? == "used";
-            let share = fact
-                .quantities
-                .get("share")?
-                .as_f64()
-                .filter(|_| is_input)?;
-            let (experiment, channel) = (text("experiment")?, text("channel")?);
+            let is_input = fact.kind == "quantisation" && fact.said("action")? == "used";
+            let share = fact.number("share").filter(|_| is_input)?;
+            let (experiment, channel) = (fact.said("experiment")?, fact.said("channel")?);
             let is_input = !problem.channels().any(|c| c.kind().name() == channel);
             let error_is_stated = (problem.experiments.iter())
                 .any(|e| e.name == experiment && e.input_error.is_some());
@@ -336,16 +326,15 @@ fn two_modes(warning: &Finding) -> Option<VerdictReason> {
 /// A record that is listed twice, from a warning about the data.
 fn repeated_record(warning: &Finding) -> Option<VerdictReason> {
     (warning.kind == "repeated_record").then_some(())?;
-    let text = |name: &str| Some(warning.quantities.get(name)?.as_str()?.to_owned());
     Some(VerdictReason::RepeatedRecord {
-        experiment: text("experiment")?,
-        other: text("other")?,
+        experiment: warning.said("experiment")?,
+        other: warning.said("other")?,
     })
 }
 
 /// Faulty samples from a warning about the data.
 fn faulty_samples(warning: &Finding) -> Option<VerdictReason> {
-    let text = |name: &str| Some(warning.quantities.get(name)?.as_str()?.to_owned());
+    let text = |name: &str| warning.said(name);
     let fault = match warning.kind.as_str() {
         "saturation" => {
             let channel = text("channel")?;

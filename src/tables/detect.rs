@@ -19,7 +19,7 @@ use crate::units::Unit;
 const SAMPLE: usize = 1 << 16;
 
 /// Delimiters, most common first; a blank denotes runs of blanks.
-const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
+pub(super) const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
 
 /// Delimiter, decimal sign, and rows of names, units and data of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

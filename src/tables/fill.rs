@@ -14,6 +14,7 @@ use super::table_memory::TableMemory;
 use crate::clock::Clock;
 use crate::error::{InputError, Location};
 use crate::formats::{Meaning, meaning};
+use crate::number_format::count;
 use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
 use crate::units::{Quantity, Unit};
@@ -287,17 +288,13 @@ fn ragged(
     expected: usize,
     headers: &[String],
 ) -> InputError {
-    let plural = |n: usize| match n {
-        1 => "1 field".to_owned(),
-        n => format!("{n} fields"),
-    };
     let problem = match headers {
         [] => "the row does not fit the other rows",
         _ => "the row does not fit the column names",
     };
     let error = InputError::new(place, problem)
-        .found(plural(fields.len()))
-        .expected(format!("{}, one per column", plural(expected)));
+        .found(count(fields.len(), "field"))
+        .expected(format!("{}, one per column", count(expected, "field")));
     if fields.iter().any(|field| field.contains('\n')) {
         return error.hint("a quote that is opened in this row is not closed in it");
     }

@@ -27,4 +27,4 @@ pub use repeats::{Duplicates, RepeatedTimes, lines_in_words, repeated_times};
 pub use stated::StatedUnit;
 pub(crate) use table::TABLE;
 pub use table::Table;
-pub use times::{SAMPLE_RATES, increasing, increasing_at, without_rounding};
+pub use times::{SAMPLE_RATES, increasing, increasing_at, sample_rates, without_rounding};

@@ -3,13 +3,12 @@
 use std::collections::BTreeSet;
 
 use super::Table;
+use super::detect::DELIMITERS;
 use crate::formats::{Fact, Meaning, Subject, letters, meaning};
 use crate::headings::split_unit;
 use crate::quantity_names::quantity_of;
 use crate::units::{Quantity, Unit, unbracketed};
 
-/// Signs between the values of a line, beside that of the rows.
-const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
 /// Longest line that states something in words, letters.
 const LONGEST: usize = 60;
 

@@ -31,6 +31,12 @@ pub struct RepeatedTimes {
 }
 
 impl RepeatedTimes {
+    /// Times that are all different.
+    pub const NONE: Self = Self {
+        groups: Vec::new(),
+        are_equal: true,
+    };
+
     /// Rows that a merged column does not have.
     pub fn excess(&self) -> usize {
         self.groups.iter().map(|rows| rows.len() - 1).sum()
@@ -78,12 +84,13 @@ impl RepeatedTimes {
             );
         }
         let count = self.excess();
+        let repeat = if count == 1 {
+            "row repeats"
+        } else {
+            "rows repeat"
+        };
         error.hint(format!(
-            "`duplicates: first` keeps the first row of each time, `duplicates: mean` the mean; {} a time: {}",
-            match count {
-                1 => "1 row repeats".to_owned(),
-                _ => format!("{count} rows repeat"),
-            },
+            "`duplicates: first` keeps the first row of each time, `duplicates: mean` the mean; {count} {repeat} a time: {}",
             lines_in_words(&self.lines(table, LISTED), count)
         ))
     }

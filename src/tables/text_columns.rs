@@ -1,6 +1,7 @@
 //! Columns of a text table after its rows are read: names in a comment, footers, units of clocks, and runs side by side.
 
 use super::Table;
+use super::detect::DELIMITERS;
 use super::origin::ColumnValues;
 use crate::formats::{Channel, align, own_times};
 use crate::headings::split_unit;
@@ -10,8 +11,6 @@ use crate::text_io::quote;
 use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::signal::median;
 
-/// Delimiters of names in a comment beside that of the rows.
-const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
 /// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.
 const SINCE_1970: [(f64, &str); 3] = [(1e11, "ms"), (1e14, "µs"), (1e17, "ns")];
 /// Days of the years from 1982 to 2076, as spreadsheets and modified Julian days, MATLAB, and Julian days count them; and the spacing (s)

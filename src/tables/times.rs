@@ -16,6 +16,12 @@ const SPACING_TOLERANCE: f64 = 1e-6;
 /// from overflow and underflow.
 pub const SAMPLE_RATES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 
+/// The sampling rates that are accepted, for messages.
+pub fn sample_rates() -> String {
+    let (least, most) = (SAMPLE_RATES.start(), SAMPLE_RATES.end());
+    format!("samples per second, a number from {least:e} to {most:e}")
+}
+
 /// The times in a column, strictly increasing.
 ///
 /// # Errors

@@ -2,6 +2,7 @@
 
 mod entry;
 
+use super::Place;
 use crate::config::ModelFile;
 use crate::error::InputError;
 use kmcfit_core::internals::builder::Builder;
@@ -24,7 +25,9 @@ pub(super) fn add(
     }
     for (i, spec) in list.iter().enumerate() {
         let soft = spec.soft.map(|weight| weight.0);
-        for (key, constraint) in entry::read(file, grid, &format!("constraints[{i}]"), spec)? {
+        for (key, constraint) in
+            entry::read(Place::new(file, format!("constraints[{i}]")), grid, spec)?
+        {
             builder = builder.constraint(key, constraint, soft);
         }
     }

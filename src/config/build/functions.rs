@@ -1,9 +1,10 @@
 //! Coefficient functions of a model file as specifications of the builder, and the true coefficients.
 
-use super::on_grid::{NodalColumnRequest, column_on_grid};
+use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::spec::{
-    self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
+    self as config, Basis, ColumnSpec, ExperimentSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
 use crate::config::values::{
     Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Text,
@@ -51,42 +52,22 @@ pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
         .collect()
 }
 
-/// The functions of experiment `i` alone.
-pub(super) fn own(file: &ModelFile, i: usize) -> Vec<Given<'_>> {
+/// The functions of an experiment alone.
+pub(super) fn own(spec: &ExperimentSpec) -> Vec<Given<'_>> {
     let kinds = CoefficientKind::ALL.into_iter();
-    let own = file.spec.experiments[i].functions.as_ref();
+    let own = spec.functions.as_ref();
     let of_kind = |kind| Some((kind, own.and_then(|own| by_kind!(own, kind))?));
     kinds.filter_map(of_kind).collect()
 }
 
 /// All functions of the model.
 pub(super) fn all(file: &ModelFile) -> Vec<Given<'_>> {
-    let own = (0..file.spec.experiments.len()).flat_map(|i| own(file, i));
+    let own = file.spec.experiments.iter().flat_map(own);
     shared(file).into_iter().chain(own).collect()
 }
 
-/// Start values from the records, for functions without `start`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RecordStarts {
-    /// kg.
-    pub mass: f64,
-    /// N s/m.
-    pub damping: f64,
-    /// N/m.
-    pub stiffness: f64,
-}
-
-impl RecordStarts {
-    /// Start value of a function; `None` for terms beside mass, damping and stiffness.
-    fn of_kind(&self, kind: CoefficientKind) -> Option<f64> {
-        match kind {
-            CoefficientKind::Mass => Some(self.mass),
-            CoefficientKind::Damping => Some(self.damping),
-            CoefficientKind::Stiffness => Some(self.stiffness),
-            _ => None,
-        }
-    }
-}
+/// Start values of mass (kg), damping (N s/m) and stiffness (N/m) from the records, for functions without `start`.
+pub(super) type RecordStarts = [(CoefficientKind, f64); 3];
 
 /// What a function takes that its keys leave out.
 #[derive(Clone, Copy)]
@@ -100,59 +81,53 @@ pub(super) struct Defaults<'a> {
 /// The specification of the function at `key`; if the fit is limited, an estimated mass without `min` has a lower bound of
 /// [`LEAST_MASS`] times its smallest start value.
 pub(super) fn specification(
-    file: &ModelFile,
+    at: &Place<'_>,
     grid: &Grid,
-    key: &str,
     (kind, given): Given<'_>,
     defaults: Defaults<'_>,
 ) -> Result<CoefficientSpec, InputError> {
-    let is_own = !key.starts_with("functions.");
-    check_basis_keys(file, key, given)?;
+    let is_own = !at.key.starts_with("functions.");
+    check_basis_keys(at, given)?;
     let bound = |name: &str, given: &Option<Bound>| match given {
         None | Some(Bound::None) => Ok(None),
-        Some(Bound::At(given)) => history(file, grid, &format!("{key}.{name}"), given).map(Some),
+        Some(Bound::At(given)) => history(&at.below(name), grid, given).map(Some),
     };
     let mut spec = match (&given.fixed, &given.start, given.basis) {
         (Some(_), Some(_), _) => {
-            return Err(file
-                .error_at(
-                    &format!("{key}.start"),
-                    "`fixed` and `start` exclude each other",
-                )
+            return Err(at
+                .error_in("start", "`fixed` and `start` exclude each other")
                 .expected("either `fixed` or `start`"));
         }
         (Some(_), None, Some(_)) => {
-            return Err(file
-                .error_at(
-                    &format!("{key}.basis"),
-                    "`fixed` and `basis` exclude each other",
-                )
+            return Err(at
+                .error_in("basis", "`fixed` and `basis` exclude each other")
                 .expected("either `fixed`, or `basis` with `start`"));
         }
         (Some(fixed), None, None) => {
-            refuse_negative_stiffness(file, key, kind, fixed)?;
-            known(file, grid, &format!("{key}.fixed"), fixed)?
+            refuse_negative_stiffness(at, kind, fixed)?;
+            known(&at.below("fixed"), grid, fixed)?
         }
         (None, None, None) if is_own && is_known_part_alone(given) => CoefficientSpec::shared(),
         (None, None, basis_name) => {
-            let start = defaults.starts.and_then(|starts| starts.of_kind(kind));
-            let Some((basis_name, start)) = basis_name.zip(start) else {
-                return Err(file
-                    .error_at(key, "this function has neither a start nor a fixed value")
+            let mut starts = defaults.starts.into_iter().flatten();
+            let start = starts.find(|(of, _)| *of == kind);
+            let Some((basis_name, (_, start))) = basis_name.zip(start) else {
+                return Err(at
+                    .error("this function has neither a start nor a fixed value")
                     .expected("`start` for a function to be fitted, `fixed` for a known one")
                     .hint("mass, damping and stiffness of a fit start from the record"));
             };
-            let basis = basis(file, key, given, basis_name)?;
-            CoefficientSpec::estimated(basis, builder::Start::Constant(start))
+            let basis = basis(at, given, basis_name)?;
+            CoefficientSpec::estimated(basis, builder::Start::Constant(*start))
         }
         (None, Some(_), None) => {
-            return Err(file
-                .error_at(key, "a function to be fitted needs a basis")
+            return Err(at
+                .error("a function to be fitted needs a basis")
                 .expected(format!("`basis`, one of {}", basis_names())));
         }
         (None, Some(given_start), Some(kind)) => {
-            let basis = basis(file, key, given, kind)?;
-            let start = start(file, grid, &format!("{key}.start"), kind, given_start)?;
+            let basis = basis(at, given, kind)?;
+            let start = start(&at.below("start"), grid, kind, given_start)?;
             CoefficientSpec::estimated(basis, start)
         }
     };
@@ -161,15 +136,10 @@ pub(super) fn specification(
         spec = spec.min_of_start(LEAST_MASS);
     }
     for (place, given) in given.penalty.iter().flat_map(|list| list.iter()) {
-        spec = spec.penalty(penalty(
-            file,
-            grid,
-            &format!("{key}.penalty{place}"),
-            given,
-        )?);
+        spec = spec.penalty(penalty(&at.below(&format!("penalty{place}")), grid, given)?);
     }
     if let Some(part) = &given.known_part {
-        spec = spec.known_part(known(file, grid, &format!("{key}.known_part"), part)?);
+        spec = spec.known_part(known(&at.below("known_part"), grid, part)?);
     }
     Ok(match given.width {
         Some(width) => spec.width(width.0),
@@ -179,8 +149,7 @@ pub(super) fn specification(
 
 /// Refuses a fixed negative stiffness without a stiffening term: every motion would grow without end.
 fn refuse_negative_stiffness(
-    file: &ModelFile,
-    key: &str,
+    at: &Place<'_>,
     kind: CoefficientKind,
     fixed: &KnownValue,
 ) -> Result<(), InputError> {
@@ -189,12 +158,12 @@ fn refuse_negative_stiffness(
         KnownValue::Map(map) => map.value.map(|value| value.0),
         KnownValue::Unknown => None,
     };
-    let functions = &file.spec.functions;
+    let functions = &at.file.spec.functions;
     let is_stiffened = functions.cubic_stiffness.is_some() || functions.quintic_stiffness.is_some();
     match value.filter(|value| *value < 0.0 && kind == CoefficientKind::Stiffness) {
-        Some(value) if !is_stiffened => Err(file
-            .error_at(
-                &format!("{key}.fixed"),
+        Some(value) if !is_stiffened => Err(at
+            .error_in(
+                "fixed",
                 "a negative stiffness without a term that stiffens: every motion grows without end",
             )
             .found(value)
@@ -213,18 +182,12 @@ fn is_known_part_alone(given: &FunctionSpec) -> bool {
 }
 
 /// Known values at `key`.
-fn known(
-    file: &ModelFile,
-    grid: &Grid,
-    key: &str,
-    given: &KnownValue,
-) -> Result<CoefficientSpec, InputError> {
+fn known(at: &Place<'_>, grid: &Grid, given: &KnownValue) -> Result<CoefficientSpec, InputError> {
     let map = match given {
         KnownValue::Number(value) => return Ok(CoefficientSpec::fixed(value.0)),
-        KnownValue::Unknown if key == UNKNOWN_MASS => return Ok(CoefficientSpec::fixed(1.0)),
+        KnownValue::Unknown if at.key == UNKNOWN_MASS => return Ok(CoefficientSpec::fixed(1.0)),
         KnownValue::Unknown => {
-            return Err(file
-                .error_at(key, "only the mass can be unknown")
+            return Err(at.error("only the mass can be unknown")
                 .found("`unknown`")
                 .expected("a value, or `basis` for a function to be fitted")
                 .hint("all coefficients are ratios to an unknown mass: `functions: {mass: {fixed: unknown}}`"));
@@ -244,7 +207,7 @@ fn known(
                 data: data.clone(),
                 column: name.clone(),
             });
-            history(file, grid, key, &column).map(CoefficientSpec::known)
+            history(at, grid, &column).map(CoefficientSpec::known)
         }
         _ => {
             let keys = [
@@ -259,11 +222,8 @@ fn known(
                 true => "an empty map".to_owned(),
                 false => given.join(" and "),
             };
-            Err(file
-                .error_at(
-                    key,
-                    "neither a value with its standard deviation nor a column of a file",
-                )
+            Err(at
+                .error("neither a value with its standard deviation nor a column of a file")
                 .found(found)
                 .expected("{value: 4.5, sigma: 0.02}, or {data: file.csv, column: name}"))
         }
@@ -315,7 +275,7 @@ fn own_key(kind: Basis) -> Option<&'static str> {
 }
 
 /// Refuses `knots` and `degree` where the basis does not use them.
-fn check_basis_keys(file: &ModelFile, key: &str, spec: &FunctionSpec) -> Result<(), InputError> {
+fn check_basis_keys(at: &Place<'_>, spec: &FunctionSpec) -> Result<(), InputError> {
     let given = [
         ("knots", spec.knots.is_some()),
         ("degree", spec.degree.is_some()),
@@ -324,12 +284,11 @@ fn check_basis_keys(file: &ModelFile, key: &str, spec: &FunctionSpec) -> Result<
     let Some((unused, _)) = given.iter().find(|(k, given)| *given && own != Some(*k)) else {
         return Ok(());
     };
-    let at = format!("{key}.{unused}");
-    let error = match spec.basis {
-        Some(kind) => file.error_at(&at, format!("the basis `{kind}` does not use this key")),
-        None => file.error_at(&at, "this key needs a basis that uses it"),
+    let problem = match spec.basis {
+        Some(kind) => format!("the basis `{kind}` does not use this key"),
+        None => "this key needs a basis that uses it".to_owned(),
     };
-    Err(error
+    Err((at.error_in(unused, problem))
         .found(format!("`{unused}`"))
         .expected(match (spec.basis, own) {
             (_, Some(own)) => format!("`{own}`"),
@@ -343,14 +302,9 @@ fn check_basis_keys(file: &ModelFile, key: &str, spec: &FunctionSpec) -> Result<
 }
 
 /// The basis of a function to be fitted.
-fn basis(
-    file: &ModelFile,
-    key: &str,
-    spec: &FunctionSpec,
-    kind: Basis,
-) -> Result<BasisSpec, InputError> {
+fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: Basis) -> Result<BasisSpec, InputError> {
     let missing = |what: &str, expected: &str| {
-        file.error_at(key, format!("the basis `{kind}` needs {what}"))
+        at.error(format!("the basis `{kind}` needs {what}"))
             .expected(expected)
     };
     let knots = || match &spec.knots {
@@ -387,40 +341,38 @@ fn basis_names() -> String {
 }
 
 fn start(
-    file: &ModelFile,
+    at: &Place<'_>,
     grid: &Grid,
-    key: &str,
     kind: Basis,
     given: &StartSpec,
 ) -> Result<builder::Start, InputError> {
     match given {
         StartSpec::Number(value) => Ok(builder::Start::Constant(value.0)),
-        StartSpec::List(_) if kind == Basis::BSpline => Err(file
-            .error_at(key, "`start` of the basis `b-spline` must be one number")
+        StartSpec::List(_) if kind == Basis::BSpline => Err(at
+            .error("`start` of the basis `b-spline` must be one number")
             .found("a list")
             .expected("a finite number, or a column: {data: file.csv, column: name}")),
         StartSpec::List(values) => Ok(builder::Start::Parameters(numbers(values))),
-        StartSpec::Column(c) => Ok(builder::Start::Nodal(column(file, grid, key, c)?)),
+        StartSpec::Column(c) => Ok(builder::Start::Nodal(column(at, grid, c)?)),
     }
 }
 
 fn penalty(
-    file: &ModelFile,
+    at: &Place<'_>,
     grid: &Grid,
-    key: &str,
     given: &config::PenaltySpec,
 ) -> Result<PenaltySpec, InputError> {
     if given.kind == PenaltyKind::TotalVariation {
-        return total_variation(file, key, given);
+        return total_variation(at, given);
     }
     let Some(Count(order)) = given.order else {
-        return Err(file
-            .error_at(key, "the key `order` is missing")
+        return Err(at
+            .error("the key `order` is missing")
             .found("a penalty of the kind `tikhonov` alone")
             .expected("for instance `order: 2`"));
     };
     let reference = given.reference.as_ref();
-    let reference = reference.map(|r| history(file, grid, &format!("{key}.reference"), r));
+    let reference = reference.map(|r| history(&at.below("reference"), grid, r));
     Ok(PenaltySpec::Tikhonov {
         order,
         weight: penalty_weight(given.weight),
@@ -429,21 +381,14 @@ fn penalty(
 }
 
 /// A penalty on total variation; refuses keys other than the weight.
-fn total_variation(
-    file: &ModelFile,
-    key: &str,
-    given: &config::PenaltySpec,
-) -> Result<PenaltySpec, InputError> {
+fn total_variation(at: &Place<'_>, given: &config::PenaltySpec) -> Result<PenaltySpec, InputError> {
     let others = [
         ("order", given.order.is_some()),
         ("reference", given.reference.is_some()),
     ];
     if let Some((other, _)) = others.iter().find(|(_, given)| *given) {
-        return Err(file
-            .error_at(
-                &format!("{key}.{other}"),
-                "a penalty on total variation has only a weight",
-            )
+        return Err(at
+            .error_in(other, "a penalty on total variation has only a weight")
             .found(format!("`{other}` beside `kind: tv`"))
             .expected(format!("no `{other}`, or `kind: tikhonov`")));
     }
@@ -466,47 +411,35 @@ fn penalty_weight(given: Weight) -> PenaltyWeight {
 
 /// A constant, or a column named by `key`, interpolated at the nodes.
 pub(super) fn history(
-    file: &ModelFile,
+    at: &Place<'_>,
     grid: &Grid,
-    key: &str,
     given: &NumberOrColumn,
 ) -> Result<TimeHistory, InputError> {
     match given {
         NumberOrColumn::Number(value) => Ok(TimeHistory::Constant(value.0)),
         NumberOrColumn::Column(c) => Ok(TimeHistory::Nodal {
             name: format!("{} of {}", c.column, c.data),
-            values: column(file, grid, key, c)?,
+            values: column(at, grid, c)?,
         }),
     }
 }
 
 /// Values at the nodes: a constant, or a column named by `key`.
 pub(super) fn values(
-    file: &ModelFile,
+    at: &Place<'_>,
     grid: &Grid,
-    key: &str,
     given: &NumberOrColumn,
 ) -> Result<Vec<f64>, InputError> {
-    match history(file, grid, key, given)? {
+    match history(at, grid, given)? {
         TimeHistory::Constant(value) => Ok(vec![value; grid.nodes()]),
         TimeHistory::Nodal { values, .. } => Ok(values),
     }
 }
 
 /// Nodal values of a column named by `key`.
-fn column(
-    file: &ModelFile,
-    grid: &Grid,
-    key: &str,
-    given: &ColumnSpec,
-) -> Result<Vec<f64>, InputError> {
-    let wanted = NodalColumnRequest {
-        data: &given.data.0,
-        data_key: &format!("{key}.data"),
-        column: &given.column.0,
-        column_key: &format!("{key}.column"),
-    };
-    column_on_grid(file, &wanted, grid)
+fn column(at: &Place<'_>, grid: &Grid, given: &ColumnSpec) -> Result<Vec<f64>, InputError> {
+    let data = (&*given.data.0, &at.below("data"));
+    column_on_grid(data, (&given.column.0, &at.below("column")), grid)
 }
 
 /// The true coefficient functions on the grid, where the model names them.
@@ -517,16 +450,12 @@ pub(super) fn truth(
     let Some(spec) = &file.spec.truth else {
         return Ok(None);
     };
+    let at = Place::new(file, "truth");
     let column = |(kind, _): Given| {
         let named: Option<&Text> = (spec.columns.as_ref()).and_then(|c| by_kind!(c, kind));
         let name = named.map_or(kind.column(), |name| name.0.as_str());
-        let wanted = NodalColumnRequest {
-            data: &spec.data.0,
-            data_key: "truth.data",
-            column: name,
-            column_key: &format!("truth.columns.{}", kind.name()),
-        };
-        column_on_grid(file, &wanted, grid)
+        let column = at.below(&format!("columns.{}", kind.name()));
+        column_on_grid((&spec.data.0, &at.below("data")), (name, &column), grid)
     };
     let mut list = shared(file).into_iter();
     let mass = list.next().map(&column).transpose()?.unwrap_or_default();

@@ -6,15 +6,16 @@ mod fit;
 mod functions;
 mod grid;
 mod on_grid;
+mod place;
 mod refinement;
 mod starts;
 mod study;
 
-pub(crate) use experiments::DataWarning;
 pub(in crate::config) use experiments::known_stretches;
 pub(super) use experiments::sensor_of;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
+use place::Place;
 pub use refinement::AutomaticGrid;
 pub use study::{StudyPlan, StudyTarget};
 
@@ -84,11 +85,9 @@ impl Model {
     pub fn is_kept_up(&self) -> bool {
         let mut experiments = self.problem.experiments.iter();
         experiments.all(|experiment| {
-            self.warnings.iter().any(|warning| {
-                let of = warning.quantities.get("experiment");
-                warning.kind == "unmeasured_force"
-                    && of.and_then(|name| name.as_str()) == Some(&experiment.name)
-            })
+            let is_of = |w: &Finding| w.said("experiment").as_ref() == Some(&experiment.name);
+            let mut warnings = self.warnings.iter();
+            warnings.any(|w| w.kind == "unmeasured_force" && is_of(w))
         })
     }
 }
@@ -123,24 +122,6 @@ impl BuildMode {
     }
 }
 
-/// Moves an error about a whole file to the key of the model that names the file; errors about its rows keep their place.
-fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) -> InputError {
-    let key = key.into();
-    move |error| match &error.place {
-        Location::File(path) => {
-            let problem = format!("{}: {}", path.display(), error.problem);
-            let here = file.error_at(&key, problem);
-            InputError {
-                place: here.place,
-                key: here.key,
-                problem: here.problem,
-                ..error
-            }
-        }
-        _ => error,
-    }
-}
-
 /// The builder of the core for a model file and its data, and the notes on its channels.
 fn builder(
     file: &ModelFile,
@@ -158,8 +139,8 @@ fn builder(
     };
     let shared = functions::shared(file).into_iter();
     let shared = shared.map(|given| {
-        let key = format!("functions.{}", given.0.name());
-        let spec = functions::specification(file, grid, &key, given, defaults)?;
+        let at = Place::new(file, format!("functions.{}", given.0.name()));
+        let spec = functions::specification(&at, grid, given, defaults)?;
         Ok((given.0, spec))
     });
     let shared = shared.collect::<Result<_, _>>()?;
@@ -169,8 +150,8 @@ fn builder(
         builder = builder.simulation();
     }
     let mut notes = Vec::new();
-    for (i, record) in records.into_iter().enumerate() {
-        let (record, of_record) = experiments::specification(file, grid, i, record, defaults)?;
+    for (entry, record) in experiments::Entry::all(file).zip(records) {
+        let (record, of_record) = experiments::specification(&entry, grid, record, defaults)?;
         builder = builder.record(record);
         notes.push(of_record);
     }
@@ -303,7 +284,7 @@ fn build_on(
     if !matches!(mode, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
-    let is_unit = |warning: &Finding| warning.kind == DataWarning::UNIT_ASSUMED;
+    let is_unit = |warning: &Finding| warning.kind == experiments::UNIT_ASSUMED;
     let (units, mut warnings): (Vec<_>, Vec<_>) = warnings.into_iter().partition(is_unit);
     // Each channel reads the column of times.
     let mut assumed_units = Vec::new();

@@ -1,7 +1,6 @@
 //! Coefficient functions given as CSV columns, interpolated at the nodes.
 
-use super::asked_for;
-use crate::config::ModelFile;
+use super::Place;
 use crate::error::InputError;
 use crate::tables::{Table, TableFormat, increasing};
 use crate::units::Quantity;
@@ -12,28 +11,18 @@ const TIME_COLUMN: &str = "t_s";
 /// Distance between a row and a node, in steps, up to which no interpolation is needed.
 const SAME_TIME: f64 = 1e-6;
 
-/// A requested column: file, name, and their keys in the model file.
-pub(super) struct NodalColumnRequest<'a> {
-    pub data: &'a str,
-    pub data_key: &'a str,
-    pub column: &'a str,
-    pub column_key: &'a str,
-}
-
-/// A column at the nodes: unchanged if its rows are the nodes, else interpolated linearly.
+/// A column of a data file, both with their keys in the model file, at the nodes: unchanged if its rows are the nodes, else interpolated linearly.
 pub(super) fn column_on_grid(
-    file: &ModelFile,
-    wanted: &NodalColumnRequest<'_>,
+    (data, data_at): (&str, &Place<'_>),
+    (column, column_at): (&str, &Place<'_>),
     grid: &Grid,
 ) -> Result<Vec<f64>, InputError> {
-    let about_data = asked_for(file, wanted.data_key);
-    let tables = file.tables(wanted.data, &TableFormat::default());
+    let about_data = data_at.asks_for();
+    let tables = data_at.file.tables(data, &TableFormat::default());
     let table = tables.and_then(Table::only).map_err(&about_data)?;
     check_seconds(&table).map_err(&about_data)?;
     let times = increasing(&table, TIME_COLUMN).map_err(&about_data)?;
-    let values = table
-        .column(wanted.column)
-        .map_err(asked_for(file, wanted.column_key))?;
+    let values = table.column(column).map_err(column_at.asks_for())?;
     let same = |(i, t): (usize, &f64)| (t - grid.time(i)).abs() <= SAME_TIME * grid.step();
     if times.len() == grid.nodes() && times.iter().enumerate().all(same) {
         return Ok(values.to_vec());

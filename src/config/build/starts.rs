@@ -7,6 +7,7 @@
 //! k = m (2 pi f)^2,    c = 2 zeta sqrt(k m)
 //! ```
 
+use super::Place;
 use super::experiments::{RawChannel, RawRecord, is_held_out};
 use super::functions::{self, RecordStarts};
 use crate::config::ModelFile;
@@ -56,20 +57,21 @@ pub(super) fn of_records(
         .filter(|m| *m > 0.0)
         .unwrap_or(1.0);
     let stiffness = mass * omega * omega;
-    Some(RecordStarts {
-        mass,
-        damping: 2.0 * ratio * mass * omega,
-        stiffness,
-    })
+    Some([
+        (CoefficientKind::Mass, mass),
+        (CoefficientKind::Damping, 2.0 * ratio * mass * omega),
+        (CoefficientKind::Stiffness, stiffness),
+    ])
 }
 
 /// Mean of the fixed or start values of a shared function that states them. An error of their column is reported where the function is built.
 fn stated(file: &ModelFile, grid: &Grid, kind: CoefficientKind) -> Option<f64> {
     let shared = functions::shared(file);
     let (_, given) = shared.iter().find(|(other, _)| *other == kind)?;
-    let key = format!("functions.{}", kind.name());
-    let of_column = |key: String, column: ColumnSpec| {
-        let values = functions::values(file, grid, &key, &NumberOrColumn::Column(column)).ok()?;
+    let at = Place::new(file, format!("functions.{}", kind.name()));
+    let of_column = |part: &str, column: ColumnSpec| {
+        let column = NumberOrColumn::Column(column);
+        let values = functions::values(&at.below(part), grid, &column).ok()?;
         Some(values.iter().sum::<f64>() / values.len() as f64)
     };
     match (&given.fixed, &given.start) {
@@ -79,15 +81,13 @@ fn stated(file: &ModelFile, grid: &Grid, kind: CoefficientKind) -> Option<f64> {
             (Some(value), _, _) => Some(value.0),
             (None, Some(data), Some(column)) => {
                 let (data, column) = (data.clone(), column.clone());
-                of_column(format!("{key}.fixed"), ColumnSpec { data, column })
+                of_column("fixed", ColumnSpec { data, column })
             }
             _ => None,
         },
         (None, Some(StartSpec::Number(number))) => Some(number.0),
         (None, Some(StartSpec::List(values))) => values.first().map(|first| first.0),
-        (None, Some(StartSpec::Column(column))) => {
-            of_column(format!("{key}.start"), column.clone())
-        }
+        (None, Some(StartSpec::Column(column))) => of_column("start", column.clone()),
         (None, None) => None,
     }
 }

@@ -3,6 +3,7 @@
 use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::spec::{CandidateSpec, EquivalentSpec, FunctionName, ProfileSpec, StudySpec};
 use crate::config::values::{Count, Number};
 use crate::error::InputError;
@@ -14,7 +15,6 @@ use kmcfit_core::internals::record::{
 };
 use kmcfit_core::internals::study::Choice;
 use kmcfit_core::internals::system::State;
-use std::time::Duration;
 
 /// Settings of the analyses of `study`.
 #[derive(Debug, Clone)]
@@ -39,8 +39,6 @@ pub struct StudyPlan {
     pub equivalent_systems: Vec<Choice>,
     /// Candidate experiments, with one channel read at every node; only the noise of its samples is used.
     pub candidates: Vec<Experiment>,
-    /// Wall-clock limit of one refit.
-    pub limit: Option<Duration>,
 }
 
 impl StudyPlan {
@@ -89,59 +87,61 @@ const EXTREME_TIMES: usize = 5;
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
     let none = StudySpec::default();
     let spec = file.spec.study.as_ref().unwrap_or(&none);
-    let confidence = within(file, "study.confidence", spec.confidence, CONFIDENCE, |x| {
-        x > 0.0 && x < 1.0
-    })?;
-    let spread = within(file, "study.spread", spec.spread, SPREAD, |x| {
-        x > 1.0 && x <= WIDEST_SPREAD
-    })?;
-    let merge_tolerance = within(
-        file,
-        "study.merge_tolerance",
-        spec.merge_tolerance,
-        SAME,
-        |x| x > 0.0,
+    let at = Place::new(file, "study");
+    let confidence = (spec.confidence, CONFIDENCE);
+    let confidence = within(&at, "confidence", confidence, |x| x > 0.0 && x < 1.0)?;
+    let spread = (spec.spread, SPREAD);
+    let spread = within(&at, "spread", spread, |x| x > 1.0 && x <= WIDEST_SPREAD)?;
+    let tolerance = (spec.merge_tolerance, SAME);
+    let merge_tolerance = within(&at, "merge_tolerance", tolerance, |x| x > 0.0)?;
+    check(&at, spec)?;
+    let profiles = each(&at, problem, "profiles", spec.profiles.as_deref(), target)?;
+    let candidates = each(
+        &at,
+        problem,
+        "candidates",
+        spec.candidates.as_deref(),
+        candidate,
     )?;
-    check(file, spec)?;
-    let profiles = spec.profiles.iter().flatten().enumerate();
-    let profiles = profiles
-        .map(|(i, spec)| target(file, problem, &format!("study.profiles[{i}]"), spec))
-        .collect::<Result<_, _>>()?;
-    let candidates = spec.candidates.iter().flatten().enumerate();
-    let candidates = candidates
-        .map(|(i, spec)| candidate(file, problem, &format!("study.candidates[{i}]"), spec))
-        .collect::<Result<_, _>>()?;
-    let equivalent_systems = spec.equivalent_systems.iter().flatten().enumerate();
-    let equivalent_systems = equivalent_systems
-        .map(|(i, spec)| {
-            equivalent(
-                file,
-                problem,
-                &format!("study.equivalent_systems[{i}]"),
-                spec,
-            )
-        })
-        .collect::<Result<_, _>>()?;
+    let equivalent = each(
+        &at,
+        problem,
+        "equivalent_systems",
+        spec.equivalent_systems.as_deref(),
+        equivalent,
+    )?;
     Ok(StudyPlan {
-        equivalent_systems,
+        equivalent_systems: equivalent,
         confidence,
         seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
         profiles,
-        extremes: extremes(file, problem, spec)?,
+        extremes: extremes(&at, problem, spec)?,
         misfit_limit: spec.misfit_limit.map(|level| level.0),
         starts: spec.starts.map_or(0, |count| count.0),
         spread,
         merge_tolerance,
         candidates,
-        limit: None,
     })
 }
 
+/// Reads a list of `study`.
+fn each<S, T>(
+    at: &Place<'_>,
+    problem: &Problem,
+    name: &str,
+    list: Option<&[S]>,
+    read: fn(&Place<'_>, &Problem, &S) -> Result<T, InputError>,
+) -> Result<Vec<T>, InputError> {
+    let list = list.unwrap_or_default().iter().enumerate();
+    list.map(|(i, spec)| read(&at.below(&format!("{name}[{i}]")), problem, spec))
+        .collect()
+}
+
 /// Refuses an invalid limit, count or time.
-fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
+fn check(at: &Place<'_>, spec: &StudySpec) -> Result<(), InputError> {
     if let Some(level) = spec.misfit_limit.filter(|l| l.0 <= 0.0) {
-        return Err(file
-            .error_at("study.misfit_limit", "the largest J must be positive")
+        return Err(at
+            .error_in("misfit_limit", "the largest J must be positive")
             .found(level.0)
             .expected("a number greater than 0 (dimensionless with `sigma`, otherwise m² s)"));
     }
@@ -150,25 +150,22 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
         ("merge_tolerance", spec.merge_tolerance.is_some()),
     ] {
         if is_given && spec.starts.is_none() {
-            return Err(file
-                .error_at(&format!("study.{key}"), "this key has no effect alone")
+            return Err(at
+                .error_in(key, "this key has no effect alone")
                 .expected("`starts` beside it"));
         }
     }
     let is_invalid = |count: &Count| !(1..=MOST_STARTS).contains(&count.0);
     if let Some(count) = spec.starts.filter(is_invalid) {
-        return Err(file
-            .error_at("study.starts", "invalid number")
+        return Err(at
+            .error_in("starts", "invalid number")
             .found(count.0)
             .expected(format!("1 to {MOST_STARTS}, or no `starts`")));
     }
-    if spec
-        .extremes
-        .as_ref()
-        .is_some_and(|extremes| extremes.values().is_empty())
-    {
-        return Err(file
-            .error_at("study.extremes", "the list of times is empty")
+    let extremes = spec.extremes.as_ref();
+    if extremes.is_some_and(|extremes| extremes.values().is_empty()) {
+        return Err(at
+            .error_in("extremes", "the list of times is empty")
             .found("an empty list")
             .expected("times in s, or no `extremes` for five over the record"));
     }
@@ -176,22 +173,21 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
 }
 
 fn equivalent(
-    file: &ModelFile,
+    at: &Place<'_>,
     problem: &Problem,
-    key: &str,
     spec: &EquivalentSpec,
 ) -> Result<Choice, InputError> {
     let grid = &problem.system.grid;
-    let mass_key = format!("{key}.mass");
-    let mass = values(file, grid, &mass_key, &spec.mass)?;
+    let mass_at = at.below("mass");
+    let mass = values(&mass_at, grid, &spec.mass)?;
     if let Some(least) = mass.iter().find(|m| **m <= 0.0) {
-        return Err(file
-            .error_at(&mass_key, "the mass must be positive at all times")
+        return Err(mass_at
+            .error("the mass must be positive at all times")
             .found(least)
             .expected("a number greater than 0, in kg"));
     }
     let damping = spec.damping.as_ref();
-    let damping = damping.map(|d| values(file, grid, &format!("{key}.damping"), d));
+    let damping = damping.map(|d| values(&at.below("damping"), grid, d));
     Ok(Choice {
         name: spec.name.0.clone(),
         mass,
@@ -200,19 +196,18 @@ fn equivalent(
 }
 
 fn within(
-    file: &ModelFile,
+    at: &Place<'_>,
     key: &str,
-    given: Option<Number>,
-    usual: f64,
+    (given, usual): (Option<Number>, f64),
     fits: fn(f64) -> bool,
 ) -> Result<f64, InputError> {
     match given {
-        Some(number) if !fits(number.0) => Err(file
-            .error_at(key, "invalid number")
+        Some(number) if !fits(number.0) => Err(at
+            .error_in(key, "invalid number")
             .found(number.0)
             .expected(match key {
-                "study.confidence" => "a number between 0 and 1, for instance 0.95",
-                "study.spread" => "a factor greater than 1, at most 1e6",
+                "confidence" => "a number between 0 and 1, for instance 0.95",
+                "spread" => "a factor greater than 1, at most 1e6",
                 _ => "a number greater than 0",
             })),
         given => Ok(given.map_or(usual, |number| number.0)),
@@ -220,7 +215,7 @@ fn within(
 }
 
 /// Times on the grid; evenly spread where none are given.
-fn extremes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
+fn extremes(at: &Place<'_>, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
     let grid = &problem.system.grid;
     let Some(given) = &spec.extremes else {
         let time =
@@ -228,22 +223,18 @@ fn extremes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec
         return Ok((0..EXTREME_TIMES).map(time).collect());
     };
     for (i, time) in given.values().iter().enumerate() {
-        on_grid(
-            file,
-            problem,
-            &format!("study.extremes{}", given.place(i)),
-            time.0,
-        )?;
+        let at = at.below(&format!("extremes{}", given.place(i)));
+        on_grid(&at, problem, time.0)?;
     }
     Ok(given.values().iter().map(|t| t.0).collect())
 }
 
-fn on_grid(file: &ModelFile, problem: &Problem, key: &str, time: f64) -> Result<(), InputError> {
+fn on_grid(at: &Place<'_>, problem: &Problem, time: f64) -> Result<(), InputError> {
     let grid = &problem.system.grid;
     match kmcfit_core::internals::system::TimePoint::of(grid, time) {
         Some(_) => Ok(()),
-        None => Err(file
-            .error_at(key, "this time is outside the record")
+        None => Err(at
+            .error("this time is outside the record")
             .found(time)
             .expected(format!(
                 "{} s to {} s",
@@ -254,18 +245,17 @@ fn on_grid(file: &ModelFile, problem: &Problem, key: &str, time: f64) -> Result<
 }
 
 fn target(
-    file: &ModelFile,
+    at: &Place<'_>,
     problem: &Problem,
-    key: &str,
     spec: &ProfileSpec,
 ) -> Result<StudyTarget, InputError> {
     let mean = spec.mean == Some(true);
     match (spec.function, &spec.parameter) {
         (Some(name), None) => {
-            let function = function(file, problem, key, name)?;
+            let function = function(at, problem, name)?;
             match (spec.at, mean) {
                 (Some(time), false) => {
-                    on_grid(file, problem, &format!("{key}.at"), time.0)?;
+                    on_grid(&at.below("at"), problem, time.0)?;
                     Ok(StudyTarget::Value {
                         function,
                         time: time.0,
@@ -275,8 +265,8 @@ fn target(
                 (None, false) if problem.functions.get(function).parameters() == 1 => {
                     Ok(StudyTarget::Mean { function })
                 }
-                _ => Err(file
-                    .error_at(key, "a profile needs one quantity")
+                _ => Err(at
+                    .error("a profile needs one quantity")
                     .expected("`at: TIME` or `mean: true`")),
             }
         }
@@ -287,8 +277,8 @@ fn target(
                 .map(|index| StudyTarget::Scalar { index })
                 .ok_or_else(|| {
                     let names = || scalars.iter().map(|s| s.name.as_str());
-                    let error = file
-                        .error_at(&format!("{key}.parameter"), "no such nuisance parameter")
+                    let error = at
+                        .error_in("parameter", "no such nuisance parameter")
                         .found(quote(&name.0))
                         .expected(match scalars.is_empty() {
                             true => "a model that estimates initial states or sensors".to_owned(),
@@ -300,39 +290,37 @@ fn target(
                     }
                 })
         }
-        _ => Err(file
-            .error_at(key, "a profile needs one quantity")
+        _ => Err(at
+            .error("a profile needs one quantity")
             .expected("either `function` or `parameter`")),
     }
 }
 
 /// The index of a fitted function common to all experiments.
 fn function(
-    file: &ModelFile,
+    at: &Place<'_>,
     problem: &Problem,
-    key: &str,
     quantity: FunctionName,
 ) -> Result<usize, InputError> {
     let main = problem.functions.coefficient_set(0);
     let of = |f: &&usize| problem.functions.get(**f).quantity == quantity;
-    let (key, name) = (format!("{key}.function"), quantity.name());
+    let (at, name) = (at.below("function"), quantity.name());
     match main.iter().find(of) {
         Some(&f) if problem.functions.get(f).parameters() > 0 => Ok(f),
-        Some(_) => Err(file
-            .error_at(&key, format!("the {name} is fixed, so it has no profile"))
+        Some(_) => Err(at
+            .error(format!("the {name} is fixed, so it has no profile"))
             .found(format!("`{name}`"))
             .expected("a function that is fitted")),
-        None => Err(file
-            .error_at(&key, format!("the model has no {name}"))
+        None => Err(at
+            .error(format!("the model has no {name}"))
             .found(format!("`{name}`"))
             .expected("a function of the model")),
     }
 }
 
 fn candidate(
-    file: &ModelFile,
+    at: &Place<'_>,
     problem: &Problem,
-    key: &str,
     spec: &CandidateSpec,
 ) -> Result<Experiment, InputError> {
     let grid = &problem.system.grid;
@@ -340,18 +328,15 @@ fn candidate(
     let initial = State::one(spec.initial.displacement.0, spec.initial.velocity.0);
     let mut experiment = Experiment::free(spec.name.0.clone(), initial, nodes);
     if let Some(force) = &spec.force {
-        let force = Some(Waveform::Shape(experiments::shape(file, key, force)?));
+        let force = Some(Waveform::Shape(experiments::shape(at, force)?));
         experiment.input = Input { force, base: None };
         experiment.excitation = Some(experiment.input.on(grid, nodes));
     }
     let kind = spec.channel.unwrap_or(ChannelKind::Displacement);
     let weighting = match (spec.sigma, problem.channels().next()) {
         (Some(sigma), _) if sigma.0 <= 0.0 => {
-            return Err(file
-                .error_at(
-                    &format!("{key}.sigma"),
-                    "a standard deviation must be positive",
-                )
+            return Err(at
+                .error_in("sigma", "a standard deviation must be positive")
                 .found(sigma.0)
                 .expected("a number greater than 0, in SI units"));
         }

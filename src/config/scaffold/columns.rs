@@ -43,11 +43,6 @@ impl ColumnAssignment {
         Ok((columns, stated.is_used))
     }
 
-    /// The columns with recognised names or units and the column of times; none of them need be a channel.
-    pub fn without_guess(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
-        Self::as_in_run(table, sample_rate, Vec::new(), Vec::new())
-    }
-
     /// The columns with the roles `named`, those with recognised names or units and the column of times; none of them need be a channel.
     /// Units of a role hold for a named column, and for others where the table states none.
     pub fn as_in_run(
@@ -58,7 +53,7 @@ impl ColumnAssignment {
     ) -> Result<Self, InputError> {
         let stated = ColumnStatements::of_run(named, &units);
         let mut columns = Self::known(table, sample_rate, &stated)?;
-        for column in columns.used.iter_mut().filter(|c| c.has_assumed_unit()) {
+        for column in columns.used.iter_mut().filter(|c| !c.has_unit) {
             if let Some((_, unit)) = units.iter().find(|(role, _)| *role == column.role) {
                 column.state(*unit);
             }
@@ -261,7 +256,7 @@ impl ColumnAssignment {
 
     /// The units that are assumed, as a YAML map.
     pub fn assumed_units(&self) -> Option<String> {
-        Self::map_of(self.used.iter().filter(|c| c.has_assumed_unit()))
+        Self::map_of(self.used.iter().filter(|c| !c.has_unit))
     }
 
     fn map_of<'a>(columns: impl Iterator<Item = &'a UsedColumn>) -> Option<String> {

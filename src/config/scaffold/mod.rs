@@ -11,7 +11,7 @@ mod statements;
 
 use crate::error::InputError;
 use crate::memory;
-use crate::number_format::significant;
+use crate::number_format::{count, significant};
 use crate::tables::{self, Table, TableFormat};
 use crate::text_io::{listed, quote};
 pub(super) use columns::ColumnAssignment;
@@ -113,10 +113,8 @@ fn findings(record: &FileRecord) -> Vec<String> {
     } = record;
     let mut found = Vec::new();
     if !codes.is_empty() {
-        let each = codes.iter().map(|(code, count)| match count {
-            1 => format!("1 value of {code}"),
-            _ => format!("{count} values of {code}"),
-        });
+        let each = codes.iter();
+        let each = each.map(|(code, found)| format!("{} of {code}", count(*found, "value")));
         let each: Vec<String> = each.collect();
         found.push(format!(
             "{} taken as missing samples: far outside the others (`missing`)",
@@ -158,11 +156,8 @@ fn findings(record: &FileRecord) -> Vec<String> {
             "times are repeated in {lines}: the model uses the first row of each time (`duplicates: first`)"
         ));
     }
-    if let Some((count, first)) = summary.outliers {
-        let outliers = match count {
-            1 => "1 outlier".to_owned(),
-            _ => format!("{count} outliers"),
-        };
+    if let Some((outliers, first)) = summary.outliers {
+        let outliers = count(outliers, "outlier");
         found.push(format!(
             "{outliers} (first: {}): if these stand for missing samples, use empty fields; the model has a robust loss",
             significant(first / summary.channel.1, 4)
@@ -172,10 +167,7 @@ fn findings(record: &FileRecord) -> Vec<String> {
         Some(frequency) => format!(
             "dominant frequency {} Hz: {} in the record",
             short(frequency),
-            match summary.periods().round() {
-                1.0 => "1 period".to_owned(),
-                periods => format!("{periods} periods"),
-            }
+            count(summary.periods().round() as usize, "period")
         ),
         None => "no dominant frequency was found".into(),
     });
@@ -204,7 +196,8 @@ fn records_of(
     }
     let mut found = Vec::new();
     for (i, table) in tables.iter().enumerate() {
-        let columns = ColumnAssignment::without_guess(table, statements.sample_rate);
+        let columns =
+            ColumnAssignment::as_in_run(table, statements.sample_rate, Vec::new(), Vec::new());
         let is_record = |columns: &ColumnAssignment| columns.channels().next().is_some();
         if columns.is_ok_and(|columns| is_record(&columns)) {
             found.push(i);

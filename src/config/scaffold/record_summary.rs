@@ -182,11 +182,7 @@ fn times(
         None => {
             let rate = columns.sample_rate.unwrap_or(1.0);
             let times = (0..table.rows()).map(|i| i as f64 / rate).collect();
-            let none = RepeatedTimes {
-                groups: Vec::new(),
-                are_equal: true,
-            };
-            Ok((times, none))
+            Ok((times, RepeatedTimes::NONE))
         }
     }
 }

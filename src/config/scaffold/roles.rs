@@ -127,11 +127,6 @@ impl UsedColumn {
         self.scale * self.unit.factor()
     }
 
-    /// True if neither the file nor an option states the unit.
-    pub(super) fn has_assumed_unit(&self) -> bool {
-        !self.has_unit
-    }
-
     /// The unit with its factor: `50 g`.
     pub(super) fn unit_in_words(&self) -> String {
         match self.scale == 1.0 {

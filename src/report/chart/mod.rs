@@ -13,5 +13,5 @@ mod thin;
 
 pub use axis::{Axis, Scale};
 pub use figure::{Figure, Panel};
-pub use plot_mark::{Colour, Dash, Mark, Style};
+pub use plot_mark::{Colour, Dash, Mark, Style, sides};
 pub use svg::render;

@@ -218,6 +218,12 @@ impl Mark {
         }
     }
 
+    /// A band between pairs of ends.
+    pub fn band_of(label: &str, x: &[f64], ends: &[[f64; 2]], colour: Colour) -> Self {
+        let [low, high] = sides(ends);
+        Self::band(label, x, &low, &high, colour)
+    }
+
     /// Sets the dash pattern.
     #[must_use]
     pub fn dash(mut self, dash: Dash) -> Self {
@@ -245,4 +251,8 @@ impl Mark {
     pub fn vertical(label: impl Into<String>, x: f64, style: Style) -> Self {
         Self::new(MarkKind::Upright, label, &[x], &[], style)
     }
+}
+/// Lower and upper ends.
+pub fn sides(ends: &[[f64; 2]]) -> [Vec<f64>; 2] {
+    [0, 1].map(|side| ends.iter().map(|ends| ends[side]).collect())
 }

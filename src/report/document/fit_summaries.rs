@@ -42,13 +42,6 @@ pub struct WeightSummary {
     pub path: Vec<PathPointSummary>,
 }
 
-impl WeightSummary {
-    /// Iterations of all fits along the path.
-    pub fn iterations(&self) -> u64 {
-        self.path.iter().map(|point| point.iterations).sum()
-    }
-}
-
 /// One fit along the path of weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PathPointSummary {

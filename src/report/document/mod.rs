@@ -327,12 +327,6 @@ impl ResultDocument {
         self.channels().any(|c| c.sigma_estimated)
     }
 
-    /// True if `J/J0` compares the optimum with the start: not with an estimated sigma, since J then uses that of the
-    /// optimum.
-    pub(super) fn has_ratio(&self) -> bool {
-        !self.estimates_sigma()
-    }
-
     /// Smallest fit of a channel, per cent.
     pub(super) fn worst_fit(&self) -> Option<f64> {
         let fits = self.channels().map(|c| c.fit_percent);

@@ -12,7 +12,7 @@ use crate::report::chart::Figure;
 use crate::report::document::{NuisanceParameter, ResultDocument};
 use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
-use crate::report::summary::{write_attempts, write_constraints, write_nuisance_parameters};
+use crate::report::summary;
 use crate::units::{Quantity, Unit};
 
 /// The page of a run.
@@ -114,7 +114,7 @@ fn search(run: &FittedModel, document: &ResultDocument) -> String {
     }
     let end =
         overview::state(document) + &paragraph(&format!("J: {}", document.model.cost_definition));
-    let attempts = list(&lines(|text| write_attempts(text, document)));
+    let attempts = list(&summary::attempts(document));
     format!(
         "<details>\n<summary>End and convergence of the search</summary>\n{end}{attempts}{}</details>\n",
         figures(&drawn)
@@ -126,7 +126,7 @@ fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
     let asked =
         problem.constraints.groups.len() + problem.constraints.cones.len() + problem.soft.len();
     let worst = document.constraints.max_violation;
-    let said = lines(|text| write_constraints(text, document));
+    let said = summary::constraints(document);
     let hold = match (asked, worst) {
         (0, _) => "The model has no constraints.".to_string(),
         (_, 0.0) => "All constraints are satisfied.".to_string(),
@@ -151,9 +151,7 @@ fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
         [] => String::new(),
         list => paragraph(&format!("Assumptions: {}.", list.join("; "))),
     };
-    text += &list(&lines(|text| {
-        write_nuisance_parameters(text, &in_shown_units(document))
-    }));
+    text += &list(&summary::nuisance_parameters(&in_shown_units(document)));
     if let Some(bands) = run.bands() {
         let notes = bands.functions.iter().chain(&bands.ratios);
         let notes = notes.flat_map(|b| b.notes.iter().map(|n| format!("{}: {n}", b.name)));
@@ -238,12 +236,4 @@ fn in_shown_units(document: &ResultDocument) -> Vec<NuisanceParameter> {
         },
     })
     .collect()
-}
-
-/// Lines of a part of the summary.
-fn lines(write: impl Fn(&mut String) -> std::fmt::Result) -> Vec<String> {
-    let mut text = String::new();
-    // Writing to a String cannot fail.
-    let _ = write(&mut text);
-    text.lines().map(str::to_owned).collect()
 }

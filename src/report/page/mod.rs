@@ -68,9 +68,9 @@ pub(crate) fn sectioned(title: &str, first: &str, mut sections: Vec<Section>) ->
         )
     });
     let body = format!(
-        "{first}<div class=\"sections\">\n<nav aria-label=\"Contents\">\n{}</nav>\n<div>\n{}{}</div>\n</div>\n",
+        "{first}<div class=\"sections\">\n<nav aria-label=\"Contents\">\n{}</nav>\n<div>\n<p class=\"soft screen\">{}</p>\n{}</div>\n</div>\n",
         links.collect::<String>(),
-        help(),
+        escape(KEYS),
         parts.collect::<String>()
     );
     page(title, &body)
@@ -108,11 +108,6 @@ fn figure(figure: &Figure) -> String {
         escape(&figure.description),
         inline(&render(figure)),
     )
-}
-
-/// Instructions for the charts, shown only with scripts.
-fn help() -> String {
-    format!("<p class=\"soft screen\">{}</p>\n", escape(KEYS))
 }
 
 /// Figures one below the other.

@@ -1,9 +1,9 @@
 //! Status, key figures, and the tables of coefficients and records.
 
 use super::table::{list, number, table};
+use crate::number_format::count;
 use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
-use crate::report::summary::count;
 use crate::report::text::prose;
 use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::functions::Ratios;

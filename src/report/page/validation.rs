@@ -3,6 +3,7 @@
 use super::figures;
 use super::table::{list, paragraph};
 use crate::report::FittedModel;
+use crate::report::channel_view::sentence;
 use crate::report::document::{ResultDocument, ValidationSummary};
 use crate::report::extent;
 use crate::report::text::and_list;
@@ -12,12 +13,11 @@ pub(super) fn validation(run: &FittedModel, document: &ResultDocument) -> String
     let Some(result) = extent::validation(document) else {
         return String::new();
     };
-    let mut capital = result.chars();
-    let first = capital.next().map(|c| c.to_ascii_uppercase());
-    let result: String = first.into_iter().chain(capital).collect();
     let basis = "The coefficients are fixed at their estimates; these records had no part in the fit. A fit of 90 % or more passes.";
     let records: Vec<String> = document.validation.iter().map(record).collect();
-    paragraph(&format!("{result}. {basis}")) + &list(&records) + &figures(&run.drawn().validation)
+    paragraph(&format!("{} {basis}", sentence(&result)))
+        + &list(&records)
+        + &figures(&run.drawn().validation)
 }
 
 /// A record with its own parameters.

@@ -2,7 +2,8 @@
 
 use super::identified::system_of;
 use crate::number_format::significant;
-use crate::report::{Run, prediction_table};
+use crate::report::chart::Figure;
+use crate::report::{CsvTable, Run, figures, prediction_table};
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::step::SimulationError;
 use kmcfit_core::internals::study::{PredictedResponse, PredictionSummary, predict};
@@ -12,9 +13,10 @@ use serde::Serialize;
 /// Free responses from several initial states.
 pub struct FreePredictions {
     /// Responses at the nodes of the run.
-    pub responses: Vec<PredictedResponse>,
+    responses: Vec<PredictedResponse>,
     /// 95 % band of each at the nodes; `None` without a covariance of the parameters.
-    pub bands: Vec<Option<Vec<[f64; 2]>>>,
+    bands: Vec<Option<Vec<[f64; 2]>>>,
+    times: Vec<f64>,
     is_rotation: bool,
 }
 
@@ -42,6 +44,7 @@ impl FreePredictions {
         Ok(Self {
             responses,
             bands: bands(run, states),
+            times: run.system.grid.times(),
             is_rotation: run.document.is_rotation(),
         })
     }
@@ -91,6 +94,32 @@ impl FreePredictions {
             );
         }
         text
+    }
+
+    /// All curves: times, displacements, bands and true displacements of each initial state.
+    pub fn csv(&self) -> CsvTable {
+        let unit = if self.is_rotation { "rad" } else { "m" };
+        let mut table = CsvTable::new().column("t_s", self.times.clone());
+        for (i, (predicted, band)) in self.responses.iter().zip(&self.bands).enumerate() {
+            let name = |part: &str, more: &str| format!("{part}y_{more}{unit}_{}", i + 1);
+            let displacement = predicted.response.displacement(0);
+            table = table.column(name("", ""), displacement.to_vec());
+            for (end, side) in ["low_95_", "high_95_"].into_iter().enumerate() {
+                if let Some(band) = band {
+                    let ends = band.iter().map(|ends| ends[end]).collect();
+                    table = table.column(name("", side), ends);
+                }
+            }
+            if let Some(truth) = &predicted.truth {
+                table = table.column(name("true_", ""), truth.displacement(0).to_vec());
+            }
+        }
+        table
+    }
+
+    /// The figure: a panel for each initial state.
+    pub fn figure(&self) -> Figure {
+        figures::predictions(&self.times, &self.responses)
     }
 }
 

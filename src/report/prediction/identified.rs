@@ -3,11 +3,12 @@
 use crate::config::{RunSensor, SensorValue};
 use crate::error::InputError;
 use crate::report::Run;
+use crate::report::columns::{kind_named, named_column};
 use crate::report::parameters::{FunctionBasis, ParametersDocument};
 use crate::report::run_reader::at_nodes;
-use crate::units::{Quantity, Unit};
+use crate::units::Unit;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, CoefficientSet, ScalarParameter, ScalarValue,
+    Basis, CoefficientFunction, CoefficientSet, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::record::{ChannelKind, Sensor};
 use kmcfit_core::internals::study::IdentifiedSystem;
@@ -109,12 +110,7 @@ pub(super) fn system_of(run: &Run, sensors: &[&RunSensor]) -> Result<SystemOfRun
         .filter_map(|c| Some((kind(&c.kind)?, c)));
     let channels: Vec<_> = channels.collect();
     let sigmas = channels.iter().filter_map(|(kind, channel)| {
-        let quantity = match kind {
-            ChannelKind::Displacement => Quantity::Displacement,
-            ChannelKind::Velocity => Quantity::Velocity,
-            ChannelKind::Acceleration => Quantity::Acceleration,
-        };
-        let unit = Unit::recognise(quantity, &channel.unit)?;
+        let unit = Unit::recognise((*kind).into(), &channel.unit)?;
         Some((*kind, channel.sigma? * unit.factor()))
     });
     Ok(SystemOfRun {
@@ -157,17 +153,8 @@ fn function(
     is_known_part: bool,
 ) -> Result<CoefficientFunction, InputError> {
     let grid = &run.system.grid;
-    let mut kinds = CoefficientKind::ALL.into_iter();
-    let quantity = kinds.find(|kind| kind.name() == name);
-    let quantity = quantity.ok_or_else(|| damaged(run, &format!("a function `{name}`")))?;
-    let column = match run.document.is_rotation() {
-        true => quantity.angular_column(),
-        false => quantity.column(),
-    };
-    let column = match is_known_part {
-        true => format!("known_part_of_{column}"),
-        false => column.to_owned(),
-    };
+    let kind = kind_named(name).zip(named_column(&stored.name, run.document.is_rotation()));
+    let (quantity, column) = kind.ok_or_else(|| damaged(run, &format!("a function `{name}`")))?;
     let rows = run.functions.finite(&column)?;
     let values = at_nodes(rows, grid.nodes(), run.document.model.steps_per_row);
     if stored.count == 0 {

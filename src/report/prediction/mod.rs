@@ -7,6 +7,7 @@ mod record;
 use super::chart::{Colour, Figure, Mark, Panel, Style};
 use super::csv::CsvTable;
 use super::run_reader::Run;
+use super::text::aligned_to;
 use crate::config::{NewRecord, RunSensor};
 use crate::error::InputError;
 use crate::number_format::significant;
@@ -117,18 +118,23 @@ impl ForcedPredictions {
 
     /// Key numbers of all channels.
     pub fn summaries(&self) -> Vec<ForcedSummary> {
+        self.of_channels(|initial, channel, is_measured| {
+            self.summary(initial, channel, is_measured)
+        })
+    }
+
+    /// Something of each channel of each case: its initial state, the channel, and whether it was measured.
+    fn of_channels<T>(&self, of: impl Fn(&State, &PredictedChannel, bool) -> T) -> Vec<T> {
         let each = self.cases.iter().flat_map(|case| {
             let channels = case.channels.iter().zip(&case.is_measured);
-            channels.map(|(channel, is_measured)| {
-                self.summary(case.initial.clone(), channel, *is_measured)
-            })
+            channels.map(|(channel, is_measured)| of(&case.initial, channel, *is_measured))
         });
         each.collect()
     }
 
     fn summary(
         &self,
-        initial: State,
+        initial: &State,
         channel: &PredictedChannel,
         is_measured: bool,
     ) -> ForcedSummary {
@@ -200,7 +206,7 @@ impl ForcedPredictions {
             }
             rows.push(row);
         }
-        aligned(&rows)
+        aligned_to(&rows, |_| true)
     }
 
     /// All curves: times, predictions, bands and measurements of each channel and initial state.
@@ -247,12 +253,8 @@ impl ForcedPredictions {
 
     /// The figure: a panel for each channel and initial state.
     pub fn figure(&self) -> Figure {
-        let panels = self.cases.iter().flat_map(|case| {
-            let channels = case.channels.iter().zip(&case.is_measured);
-            channels.map(|(channel, is_measured)| {
-                self.panel(case.initial.clone(), channel, *is_measured)
-            })
-        });
+        let panels = self
+            .of_channels(|initial, channel, is_measured| self.panel(initial, channel, is_measured));
         Figure::new(
             "predictions",
             "Predictions",
@@ -261,7 +263,7 @@ impl ForcedPredictions {
         .panels(panels)
     }
 
-    fn panel(&self, initial: State, channel: &PredictedChannel, is_measured: bool) -> Panel {
+    fn panel(&self, initial: &State, channel: &PredictedChannel, is_measured: bool) -> Panel {
         let kind = channel.channel.kind();
         let t = channel.channel.times();
         let mut panel = Panel::of_time(
@@ -279,9 +281,7 @@ impl ForcedPredictions {
         ];
         for (label, band, colour) in bands {
             if let Some(band) = band {
-                let [low, high]: [Vec<f64>; 2] =
-                    [0, 1].map(|end| band.iter().map(|ends| ends[end]).collect());
-                panel = panel.mark(Mark::band(label, t, &low, &high, colour));
+                panel = panel.mark(Mark::band_of(label, t, &band, colour));
             }
         }
         if is_measured {
@@ -295,22 +295,4 @@ impl ForcedPredictions {
             Style::new(Colour::Vermillion),
         ))
     }
-}
-
-/// Columns aligned, the first two and numbers to the right.
-fn aligned(rows: &[Vec<String>]) -> String {
-    let width = |j: usize| {
-        let cells = rows.iter().filter_map(|row| row.get(j));
-        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
-    };
-    let mut text = String::new();
-    for row in rows {
-        let cells = row.iter().enumerate().map(|(j, cell)| {
-            let width = width(j);
-            format!("{cell:>width$}")
-        });
-        text += &cells.collect::<Vec<_>>().join("  ");
-        text.push('\n');
-    }
-    text
 }

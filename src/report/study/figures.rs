@@ -4,24 +4,11 @@ use super::{
     BandRecord, BandsRecord, EquivalentSystemRecord, ExtremesRecord, Numbers, PredictionRecord,
     ProfileRecord, StudyDocument,
 };
-use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style, sides};
 use crate::report::figures::truth;
 use crate::report::main_figure::variation;
 use kmcfit_core::internals::study::extremes::ExtremeStatus;
 
-/// Figures of all analyses in the study.
-pub fn all(study: &StudyDocument) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    figures.extend(bands(study));
-    figures.extend(profiles(study));
-    figures.extend(extremes(study));
-    figures.extend(equivalent_systems(study));
-    figures.extend(waterfall(study));
-    figures.extend(predictions(study));
-    figures
-}
-
-/// Missing numbers as gaps.
 fn gaps(numbers: &Numbers) -> Vec<f64> {
     numbers.iter().map(|x| x.unwrap_or(f64::NAN)).collect()
 }
@@ -220,16 +207,11 @@ pub fn predictions(study: &StudyDocument) -> Option<Figure> {
 }
 
 fn prediction_panel(p: &PredictionRecord) -> Option<Panel> {
-    let split = |ends: &[[f64; 2]]| -> [Vec<f64>; 2] {
-        [0, 1].map(|side| ends.iter().map(|ends| ends[side]).collect())
-    };
-    let band = p.band.iter().map(|ends| {
-        let [low, high] = split(ends);
-        Mark::band("95 % band", &p.times, &low, &high, Colour::Sky)
-    });
+    let band = p.band.iter();
+    let band = band.map(|ends| Mark::band_of("95 % band", &p.times, ends, Colour::Sky));
     let extremes = p.envelope.iter().flat_map(|ends| {
         let style = Style::new(Colour::Vermillion).dash(Dash::Dashed).width(1.0);
-        split(ends).map(|side| Mark::line("extremes", &p.times, &side, style))
+        sides(ends).map(|side| Mark::line("extremes", &p.times, &side, style))
     });
     let style = Style::new(Colour::Blue);
     let found = Mark::line("prediction", &p.times, &p.displacement, style);

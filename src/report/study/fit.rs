@@ -2,7 +2,7 @@
 
 use super::StudiedFit;
 use crate::config::Model;
-use crate::report::FittedModel;
+use crate::report::{FittedModel, RunAssessment};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::Fit;
@@ -18,7 +18,7 @@ impl StudiedFit {
         Self {
             status: fit.outcome.status,
             reason: fit.outcome.reason.to_string(),
-            verdict: Some(FittedModel::verdict_of(model, fit)),
+            verdict: Some(FittedModel::new(model, fit, &RunAssessment::of(model, fit)).verdict()),
             cost: fit.best.evaluation.cost,
             misfit: fit.best.evaluation.misfit,
             nodes: problem.system.grid.nodes(),

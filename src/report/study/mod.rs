@@ -37,10 +37,10 @@ impl StudyDocument {
 
     /// The findings as sentences, each with the name of its part, in the order of the page.
     pub fn findings(&self) -> Vec<(&'static str, String)> {
-        let parts = text::Part::ALL.into_iter();
+        let parts = text::PARTS.into_iter();
         let of = |part: text::Part| {
-            let sentences = part.sentences(self).into_iter();
-            sentences.map(move |sentence| (part.anchor(), sentence))
+            let sentences = (part.sentences)(self).into_iter();
+            sentences.map(move |sentence| (part.anchor, sentence))
         };
         parts.flat_map(of).collect()
     }
@@ -55,7 +55,7 @@ impl StudyDocument {
     /// # Errors
     /// An error of the file system.
     pub fn write(&self, folder: &OutputFolder, model: &Model) -> io::Result<()> {
-        for figure in figures::all(self) {
+        for figure in text::PARTS.iter().filter_map(|part| (part.figure)(self)) {
             folder.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }
         let samples = model.problem.channels().map(Channel::len).sum();

@@ -2,18 +2,14 @@
 
 use super::StudyDocument;
 use super::figures;
-use super::text::{Part, widest_range};
+use super::text::{PARTS, Part, widest_range};
 use crate::report::page as shell;
 
 /// The page: one HTML file without external resources. `source` is the line on its data.
 pub fn page(study: &StudyDocument, source: &str) -> String {
-    let mut sections: Vec<shell::Section> = Part::ALL
-        .iter()
-        .map(|part| {
-            let body = section(study, *part);
-            (part.anchor(), part.heading(), body)
-        })
-        .collect();
+    let sections = PARTS.iter();
+    let sections = sections.map(|part| (part.anchor, part.heading, section(study, part)));
+    let mut sections: Vec<shell::Section> = sections.collect();
     let made = format!(
         "Made by kmcfit {}; seed {}, confidence {}; the study is {}.",
         study.version, study.seed, study.confidence, study.status
@@ -63,18 +59,9 @@ fn quantities(study: &StudyDocument) -> String {
 }
 
 /// Findings of a part beside its chart; alone where there is none.
-fn section(study: &StudyDocument, part: Part) -> String {
-    let chart = match part {
-        Part::Bands => figures::bands(study),
-        Part::Profiles => figures::profiles(study),
-        Part::Extremes => figures::extremes(study),
-        Part::Predictions => figures::predictions(study),
-        Part::EquivalentSystems => figures::equivalent_systems(study),
-        Part::Multistart => figures::waterfall(study),
-        _ => None,
-    };
-    let text = shell::list(&part.sentences(study));
-    let Some(chart) = chart else {
+fn section(study: &StudyDocument, part: &Part) -> String {
+    let text = shell::list(&(part.sentences)(study));
+    let Some(chart) = (part.figure)(study) else {
         return text;
     };
     let chart = shell::figures(&[chart]);

@@ -1,8 +1,12 @@
 //! Text of a study for the terminal and for its page.
 
-use super::{BandsRecord, ExtremesRecord, PredictionRecord, SensitivityRecord, StudyDocument};
+use super::figures;
+use super::{
+    BandsRecord, ExtremesRecord, PredictionRecord, SensitivityRecord, StudiedFit, StudyDocument,
+};
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
+use crate::report::chart::Figure;
 use kmcfit_core::internals::study::extremes::ExtremeStatus;
 use kmcfit_core::internals::study::prediction::BOUNDED;
 
@@ -13,109 +17,108 @@ const MOST_LISTED: usize = 6;
 const NEGLIGIBLE: f64 = 1e-12;
 
 /// A part of a study: one analysis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    StructuralRank,
-    Fit,
-    Sensitivity,
-    Bands,
-    Profiles,
-    Extremes,
-    EquivalentSystems,
-    Multistart,
-    Candidates,
-    Predictions,
-    Failures,
+pub struct Part {
+    /// Anchor of its section on the page.
+    pub anchor: &'static str,
+    pub heading: &'static str,
+    /// Its sentences; none for an analysis that was not run.
+    pub sentences: fn(&StudyDocument) -> Vec<String>,
+    pub figure: fn(&StudyDocument) -> Option<Figure>,
 }
 
-impl Part {
-    /// All parts in order of what the user can do about them: mend the study or the fit, change the model, measure again; then what the
-    /// records determine, and the basis of these findings.
-    pub const ALL: [Self; 11] = [
-        Self::Failures,
-        Self::Multistart,
-        Self::Candidates,
-        Self::Bands,
-        Self::Profiles,
-        Self::Extremes,
-        Self::Predictions,
-        Self::EquivalentSystems,
-        Self::Sensitivity,
-        Self::StructuralRank,
-        Self::Fit,
-    ];
+/// All parts in order of what the user can do about them: mend the study or the fit, change the model, measure again; then what the
+/// records determine, and the basis of these findings.
+pub const PARTS: [Part; 11] = [
+    Part {
+        anchor: "failures",
+        heading: "Failed analyses",
+        sentences: |study| lines(&study.failures, |f| format!("{}: {}", f.analysis, f.reason)),
+        figure: |_| None,
+    },
+    Part {
+        anchor: "starts",
+        heading: "Fits from random starting points",
+        sentences: |study| {
+            let starts = study.multistart.iter();
+            starts.flat_map(|m| Finding::texts(&m.findings)).collect()
+        },
+        figure: figures::waterfall,
+    },
+    Part {
+        anchor: "candidates",
+        heading: "Candidate experiments",
+        sentences: |study| lines(&study.candidates, |c| c.text.clone()),
+        figure: |_| None,
+    },
+    Part {
+        anchor: "bands",
+        heading: "Identifiability of functions and ratios, within the model",
+        sentences: |study| study.bands.iter().flat_map(bands).collect(),
+        figure: figures::bands,
+    },
+    Part {
+        anchor: "profiles",
+        heading: "Likelihood profiles",
+        sentences: |study| lines(&study.profiles, |p| p.text.clone()),
+        figure: figures::profiles,
+    },
+    Part {
+        anchor: "extremes",
+        heading: "Data-consistent extremes, within the model",
+        sentences: extremes,
+        figure: figures::extremes,
+    },
+    Part {
+        anchor: "predictions",
+        heading: "Predicted responses",
+        sentences: |study| lines(&study.predictions, prediction),
+        figure: figures::predictions,
+    },
+    Part {
+        anchor: "equivalent-systems",
+        heading: "Equivalent systems, in a wider model",
+        sentences: equivalent_systems,
+        figure: figures::equivalent_systems,
+    },
+    Part {
+        anchor: "sensitivity",
+        heading: "Sensitivity",
+        sentences: |study| study.sensitivity.iter().flat_map(sensitivity).collect(),
+        figure: |_| None,
+    },
+    Part {
+        anchor: "structural-rank",
+        heading: "Structural rank (before the fit)",
+        sentences: |study| Finding::texts(&study.structural_rank),
+        figure: |_| None,
+    },
+    Part {
+        anchor: "fit",
+        heading: "Fit",
+        sentences: |study| lines(study.fit.as_slice(), fit),
+        figure: |_| None,
+    },
+];
 
-    /// Anchor of its section on the page.
-    pub fn anchor(self) -> &'static str {
-        match self {
-            Self::StructuralRank => "structural-rank",
-            Self::Fit => "fit",
-            Self::Sensitivity => "sensitivity",
-            Self::Bands => "bands",
-            Self::Profiles => "profiles",
-            Self::Extremes => "extremes",
-            Self::EquivalentSystems => "equivalent-systems",
-            Self::Multistart => "starts",
-            Self::Candidates => "candidates",
-            Self::Predictions => "predictions",
-            Self::Failures => "failures",
-        }
-    }
-
-    /// Its heading.
-    pub fn heading(self) -> &'static str {
-        match self {
-            Self::StructuralRank => "Structural rank (before the fit)",
-            Self::Fit => "Fit",
-            Self::Sensitivity => "Sensitivity",
-            Self::Bands => "Identifiability of functions and ratios, within the model",
-            Self::Profiles => "Likelihood profiles",
-            Self::Extremes => "Data-consistent extremes, within the model",
-            Self::EquivalentSystems => "Equivalent systems, in a wider model",
-            Self::Multistart => "Fits from random starting points",
-            Self::Candidates => "Candidate experiments",
-            Self::Predictions => "Predicted responses",
-            Self::Failures => "Failed analyses",
-        }
-    }
-
-    /// Its sentences; none for an analysis that was not run.
-    pub fn sentences(self, study: &StudyDocument) -> Vec<String> {
-        match self {
-            Self::StructuralRank => Finding::texts(&study.structural_rank),
-            Self::Fit => lines(study.fit.as_slice(), |fit| {
-                let penalty = fit.cost - fit.misfit;
-                let parts = match penalty > 1e-6 * fit.cost {
-                    true => format!(" (misfit {:.6e}, penalties {penalty:.2e})", fit.misfit),
-                    false => String::new(),
-                };
-                let (status, reason) = (fit.status.name(), &fit.reason);
-                format!("{status}: {reason}; J = {:.6e}{parts}", fit.cost)
-            }),
-            Self::Sensitivity => study.sensitivity.iter().flat_map(sensitivity).collect(),
-            Self::Bands => study.bands.iter().flat_map(bands).collect(),
-            Self::Profiles => lines(&study.profiles, |p| p.text.clone()),
-            Self::Extremes => extremes(study),
-            Self::EquivalentSystems => equivalent_systems(study),
-            Self::Multistart => (study.multistart.iter())
-                .flat_map(|m| Finding::texts(&m.findings))
-                .collect(),
-            Self::Candidates => lines(&study.candidates, |c| c.text.clone()),
-            Self::Predictions => lines(&study.predictions, prediction),
-            Self::Failures => lines(&study.failures, |f| format!("{}: {}", f.analysis, f.reason)),
-        }
-    }
+fn fit(fit: &StudiedFit) -> String {
+    let penalty = fit.cost - fit.misfit;
+    let parts = match penalty > 1e-6 * fit.cost {
+        true => format!(" (misfit {:.6e}, penalties {penalty:.2e})", fit.misfit),
+        false => String::new(),
+    };
+    let (status, reason) = (fit.status.name(), &fit.reason);
+    format!("{status}: {reason}; J = {:.6e}{parts}", fit.cost)
 }
 
 /// The study as text in the order of its page: a heading for each analysis and its sentences.
 pub fn text(study: &StudyDocument) -> String {
     let mut text = format!("{}\n", study.title);
-    for part in Part::ALL {
-        let sentences = part.sentences(study);
+    for part in PARTS {
+        let sentences = (part.sentences)(study);
         if sentences.is_empty() {
             continue;
         }
-        text += &format!("\n{}\n", part.heading());
+        text += &format!("\n{}\n", part.heading);
         for sentence in sentences {
             text += &format!("  {sentence}\n");
         }

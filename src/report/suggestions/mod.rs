@@ -180,19 +180,11 @@ fn written(value: f64) -> String {
     format!("{rounded:?}")
 }
 
-fn text_of(warning: &Finding, key: &str) -> Option<String> {
-    Some(warning.quantities.get(key)?.as_str()?.to_owned())
-}
-
-fn number_of(warning: &Finding, key: &str) -> Option<f64> {
-    warning.quantities.get(key)?.as_f64()
-}
-
 /// Statement of the codes that stand for missing samples.
 fn about_codes(model: &Model) -> Option<Suggestion> {
     let found = model.warnings.iter().filter(|w| w.kind == "missing_codes");
     let overrides = found.filter_map(|warning| {
-        let name = text_of(warning, "experiment")?;
+        let name = warning.said("experiment")?;
         let mut experiments = model.problem.experiments.iter();
         let i = model
             .places
@@ -303,11 +295,11 @@ fn sampled_input(model: &Model, i: usize) -> Option<(&'static str, &Signal)> {
 /// Correction of an error of a record.
 fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
     document.fit_warnings().find_map(|warning| {
-        let experiment = text_of(warning, "experiment");
+        let experiment = warning.said("experiment");
         match warning.kind.as_str() {
             "channel_factor" => {
-                let channel = text_of(warning, "channel")?;
-                let factor = number_of(warning, "factor")?;
+                let channel = warning.said("channel")?;
+                let factor = warning.number("factor")?;
                 let gain = |i: usize| vec![changed_gain(model, i, &channel, factor)];
                 Some(Suggestion::change(
                     "scale_channel",
@@ -326,7 +318,7 @@ fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion>
                 ))
             }
             "delay" => {
-                let samples = number_of(warning, "samples")?;
+                let samples = warning.number("samples")?;
                 let i = place(document, &experiment?)?;
                 let record = &document.experiments[i];
                 let is_force = record.driven_by.iter().any(|d| d == "force");
@@ -364,7 +356,7 @@ fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion>
                 format!(
                     "put input and response of {} on one clock in the file: multiply the times of the response by {}",
                     experiment?,
-                    significant(1.0 + 0.01 * number_of(warning, "percent")?, 6)
+                    significant(1.0 + 0.01 * warning.number("percent")?, 6)
                 ),
             )),
             _ => None,
@@ -377,9 +369,9 @@ fn about_means(document: &ResultDocument) -> Option<Suggestion> {
     let means = document
         .fit_warnings()
         .filter(|w| w.kind == "residual_mean");
-    let size = |w: &Finding| number_of(w, "t").unwrap_or_default().abs();
+    let size = |w: &Finding| w.number("t").unwrap_or_default().abs();
     let worst = means.max_by(|a, b| size(a).total_cmp(&size(b)))?;
-    let (channel, experiment) = (text_of(worst, "channel")?, text_of(worst, "experiment")?);
+    let (channel, experiment) = (worst.said("channel")?, worst.said("experiment")?);
     let i = place(document, &experiment)?;
     Some(Suggestion::change(
         "estimate_offset",
@@ -392,8 +384,10 @@ fn about_means(document: &ResultDocument) -> Option<Suggestion> {
 fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
     let missing = document.fit_warning("missing_term")?;
     let term = CoefficientKind::deserialize(missing.quantities.get("term")?).ok()?;
-    let start = written(number_of(missing, "value")?);
-    let width = number_of(missing, "width").map(|width| format!(", width: {}", written(width)));
+    let start = written(missing.number("value")?);
+    let width = missing
+        .number("width")
+        .map(|width| format!(", width: {}", written(width)));
     Some(Suggestion::change(
         "add_term",
         "add the missing term",
@@ -408,8 +402,8 @@ fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
 /// A smaller width of Coulomb friction: the shift of the estimates is at most proportional to it.
 fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
     let depends = document.fit_warning("friction_width")?;
-    let factor = (number_of(depends, "errors")? / WIDTH_SHIFT).clamp(2.0, 16.0);
-    let width = written(number_of(depends, "width")? / factor);
+    let factor = (depends.number("errors")? / WIDTH_SHIFT).clamp(2.0, 16.0);
+    let width = written(depends.number("width")? / factor);
     Some(Suggestion::change(
         "narrow_friction",
         "the estimates depend on the width of Coulomb friction: reduce it",
@@ -422,12 +416,12 @@ fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggest
     let disturbed = document.fit_warning("disturbed_input")?;
     let is_held = |signal: &Signal| signal.interpolation() == Interpolation::Hold;
     if let Some(jump) = document.fit_warning("input_jump") {
-        let i = place(document, &text_of(jump, "experiment")?)?;
+        let i = place(document, &jump.said("experiment")?)?;
         // The jump explains the disturbance.
         is_held(sampled_input(model, i)?.1).then_some(())?;
     }
-    let i = place(document, &text_of(disturbed, "experiment")?)?;
-    let (name, sigma) = (text_of(disturbed, "input")?, number_of(disturbed, "sigma")?);
+    let i = place(document, &disturbed.said("experiment")?)?;
+    let (name, sigma) = (disturbed.said("input")?, disturbed.number("sigma")?);
     let (part, signal) = sampled_input(model, i)?;
     let is_linear = signal.interpolation() == Interpolation::Linear;
     let cubics = is_linear.then(|| format!("experiments.{i}.{part}.interpolation=cubic"));
@@ -445,11 +439,11 @@ fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggest
 /// Cubic interpolation of a force, which loses less.
 fn about_interpolation(document: &ResultDocument) -> Option<Suggestion> {
     let loss = document.fit_warning("interpolation_loss")?;
-    let input = match text_of(loss, "input")?.as_str() {
+    let input = match loss.said("input")?.as_str() {
         "force" => "force",
         _ => "base",
     };
-    let i = place(document, &text_of(loss, "experiment")?)?;
+    let i = place(document, &loss.said("experiment")?)?;
     Some(Suggestion::change(
         "cubic_interpolation",
         "interpolate the input by cubics",

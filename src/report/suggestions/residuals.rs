@@ -1,6 +1,6 @@
 //! Suggestions from the size and the patterns of the residuals.
 
-use super::{Suggestion, is_poor, number_of, of_channel, percent};
+use super::{Suggestion, is_poor, of_channel, percent};
 use crate::config::Model;
 use crate::number_format::{significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
@@ -29,7 +29,7 @@ pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
     }
     let fit = document.worst_fit().unwrap_or(100.0);
     let beyond = document.fit_warning("beyond_sigma")?;
-    let times = number_of(beyond, "times")?;
+    let times = beyond.number("times")?;
     let estimated = document.experiments.iter().enumerate().flat_map(|(i, e)| {
         (e.channels.iter()).map(move |c| format!("experiments.{i}.sigma.{}=estimate", c.kind))
     });

@@ -3,11 +3,12 @@
 //! Units: bounds, means and values in the unit of the function, slopes in that unit per s, integrals in that unit times s, times in s,
 //! frequencies in Hz, ratios in the unit of the first function per that of the second; damping ratios are dimensionless.
 
-use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::build::functions::history;
 use crate::config::spec::{ConstraintSpec, RangeSpec};
 use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;
+use crate::number_format::count;
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::{Grid, TimePoint};
@@ -75,25 +76,18 @@ impl ConstraintKey {
 
 /// One entry of `constraints` and its key.
 struct ConstraintReader<'a> {
-    file: &'a ModelFile,
+    at: Place<'a>,
     grid: &'a Grid,
-    key: &'a str,
     spec: &'a ConstraintSpec,
 }
 
 /// Returns the constraints of the entry at `key`, each with its key for error messages.
 pub(super) fn read(
-    file: &ModelFile,
+    at: Place<'_>,
     grid: &Grid,
-    key: &str,
     spec: &ConstraintSpec,
 ) -> Result<Vec<(String, Constraint)>, InputError> {
-    let reader = ConstraintReader {
-        file,
-        grid,
-        key,
-        spec,
-    };
+    let reader = ConstraintReader { at, grid, spec };
     let kind = reader.kind()?;
     reader.check_companions(kind)?;
     reader.constraints(kind)
@@ -101,13 +95,9 @@ pub(super) fn read(
 
 impl ConstraintReader<'_> {
     fn error(&self, below: &str, problem: impl Into<String>) -> InputError {
-        self.file.error_at(&self.below(below), problem)
-    }
-
-    fn below(&self, key: &str) -> String {
-        match key {
-            "" => self.key.to_owned(),
-            key => format!("{}.{key}", self.key),
+        match below {
+            "" => self.at.error(problem),
+            below => self.at.error_in(below, problem),
         }
     }
 
@@ -218,7 +208,7 @@ impl ConstraintReader<'_> {
                 Constraint::Passive
             }
         };
-        Ok(vec![(self.key.to_owned(), constraint)])
+        Ok(vec![(self.at.key.clone(), constraint)])
     }
 
     fn bound(
@@ -226,7 +216,7 @@ impl ConstraintReader<'_> {
         name: &str,
         given: Option<&NumberOrColumn>,
     ) -> Result<Option<TimeHistory>, InputError> {
-        let read = |given| history(self.file, self.grid, &self.below(name), given);
+        let read = |given| history(&self.at.below(name), self.grid, given);
         given.map(read).transpose()
     }
 
@@ -236,7 +226,7 @@ impl ConstraintReader<'_> {
         };
         self.not_empty("shape", shapes.values().len(), "at least one shape")?;
         let constraint = |(i, &shape): (usize, &Shape)| {
-            let key = format!("{}.shape{}", self.key, shapes.place(i));
+            let key = format!("{}.shape{}", self.at.key, shapes.place(i));
             let of = self.target_function();
             (key, Constraint::Shape { of, shape })
         };
@@ -285,7 +275,7 @@ impl ConstraintReader<'_> {
                 at: time.0.clamp(start, end),
                 value: values[i.min(values.len() - 1)].0,
             };
-            Ok((self.below(&below), fixed))
+            Ok((self.at.below(&below).key, fixed))
         };
         times.iter().enumerate().map(constraint).collect()
     }
@@ -306,8 +296,7 @@ impl ConstraintReader<'_> {
                 .error("equal", "an equality needs two functions")
                 .found(match names.len() {
                     0 => "an empty list".to_owned(),
-                    1 => "1 function".to_owned(),
-                    n => format!("{n} functions"),
+                    n => count(n, "function"),
                 })
                 .expected("two functions, as in [damping, stiffness]")),
         }

@@ -1,19 +1,21 @@
 //! Reading of a column of a file: times, and values in SI units within the time window.
 
-use super::data_facts::{DataAction, DataFact, MOST_PLACES, RecordNotes};
+use super::Entry;
+use super::data_facts::{FIRST, MEAN, MERGED, MOST_PLACES, RecordNotes, fact};
 use super::unit::QuantityColumn;
-use crate::config::ModelFile;
 use crate::config::alternatives::{OneOrList, ScalarOr};
-use crate::config::build::asked_for;
+use crate::config::build::Place;
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::config::values::{ColumnId, Text};
-use crate::error::InputError;
+use crate::error::{InputError, Location};
+use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::tables::{
-    ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
-    without_rounding,
+    ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, lines_in_words,
+    repeated_times, sample_rates, without_rounding,
 };
 use crate::units::{Quantity, Unit};
+use serde_json::json;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::rc::Rc;
@@ -76,8 +78,7 @@ impl PresentRows {
 
 /// A requested column, with its keys in the model file.
 pub struct ColumnRequest<'a> {
-    /// Number of the experiment.
-    pub experiment: usize,
+    pub entry: &'a Entry<'a>,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     /// Measured quantity.
@@ -87,7 +88,7 @@ pub struct ColumnRequest<'a> {
     /// Unit given in the model file.
     pub unit: Option<&'a Text>,
     /// Another column of the same file, in the same unit, and its key.
-    pub beside: Option<(&'a str, &'a str)>,
+    pub beside: Option<(&'a str, &'a Place<'a>)>,
 }
 
 fn column_name(id: &ColumnId) -> ColumnName {
@@ -98,36 +99,25 @@ fn column_name(id: &ColumnId) -> ColumnName {
 }
 
 /// Reads the requested column.
-pub fn read(
-    file: &ModelFile,
-    spec: &ExperimentSpec,
-    wanted: &ColumnRequest,
-    notes: &mut RecordNotes,
-) -> Result<ColumnSamples, InputError> {
-    let experiment = format!("experiments[{}]", wanted.experiment);
-    let column_key = format!("{experiment}.columns.{}", wanted.name);
+pub fn read(wanted: &ColumnRequest, notes: &mut RecordNotes) -> Result<ColumnSamples, InputError> {
+    let (entry, spec) = (wanted.entry, wanted.entry.spec);
+    let mut at = entry.at.below(&format!("columns.{}", wanted.name));
     let (id, own) = match wanted.column {
         ScalarOr::Scalar(id) => (id, None),
         ScalarOr::Map(source) => (&source.column, Some(source)),
     };
-    let source = Source::of(file, spec, wanted, &column_key, (id, own))?;
+    let source = Source::of(wanted, &at, (id, own))?;
     let tables = source.tables(notes)?;
     let table = source.table(&tables)?;
     for note in table.notes() {
-        let text = note.clone();
-        notes.state(
-            &file.experiment_name(wanted.experiment),
-            &DataFact::File { text },
-        );
+        notes.state(&entry.name(), Finding::new("file", note));
     }
-    let column_key = match own {
-        Some(_) => format!("{column_key}.column"),
-        None => column_key,
-    };
-    let index = (table.find(&column_name(id))).map_err(asked_for(file, &column_key))?;
+    if own.is_some() {
+        at = at.below("column");
+    }
+    let index = (table.find(&column_name(id))).map_err(at.asks_for())?;
     let column = |index| QuantityColumn {
-        file,
-        experiment: &experiment,
+        at: &entry.at,
         name: wanted.name,
         kind: wanted.kind,
         given: wanted.unit,
@@ -136,34 +126,26 @@ pub fn read(
     };
     let unit = column(index).unit(&mut notes.warnings)?;
     let factor = unit.factor();
-    let place = (wanted.experiment, &*experiment);
-    let times = times(file, spec, place, own, table, notes)?;
-    let values = table.samples(index).map_err(asked_for(file, &column_key))?;
+    let times = times(entry, own, table, notes)?;
+    let values = table.samples(index).map_err(at.asks_for())?;
     let beside = match wanted.beside {
-        Some((name, key)) => {
-            let found = table
-                .find(&ColumnName::from(name))
-                .map_err(asked_for(file, key))?;
-            column(found).same_as(unit.unit, key, &mut notes.warnings);
-            Some(table.samples(found).map_err(asked_for(file, key))?)
+        Some((name, at)) => {
+            let found = (table.find(&ColumnName::from(name))).map_err(at.asks_for())?;
+            column(found).same_as(unit.unit, &at.key, &mut notes.warnings);
+            Some(table.samples(found).map_err(at.asks_for())?)
         }
         None => None,
     };
     let label = table.label(index);
     if label == times.label {
-        return Err(file
-            .error_at(
-                &format!("{experiment}.columns"),
-                format!(
-                    "time and {} are the same column",
-                    wanted.name.replace('_', " ")
-                ),
-            )
+        let name = wanted.name.replace('_', " ");
+        return Err((entry.at)
+            .error_in("columns", format!("time and {name} are the same column"))
             .found(format!("`{label}`"))
             .expected("two columns"));
     }
-    repeats(file, spec, wanted.experiment, table, &times, notes);
-    let mut inside = inside(file, &experiment, spec, &times.values)?;
+    repeats(entry, table, &times, notes);
+    let mut inside = inside(entry, &times.values)?;
     // Responses are used at times at which every channel of the file has a sample before and after.
     let late = table.late(index);
     let lates = || (0..table.width()).map(|i| table.late(i));
@@ -203,36 +185,36 @@ pub fn read(
 }
 
 /// States the rows that repeat a time.
-fn repeats(
-    file: &ModelFile,
-    spec: &ExperimentSpec,
-    experiment: usize,
-    table: &Table,
-    times: &Times,
-    notes: &mut RecordNotes,
-) {
+fn repeats(entry: &Entry<'_>, table: &Table, times: &Times, notes: &mut RecordNotes) {
     let repeated = &times.repeated;
     if repeated.groups.is_empty() {
         return;
     }
-    let fact = DataFact::RepeatedTimes {
-        count: repeated.excess(),
-        lines: repeated.lines(table, MOST_PLACES),
-        action: match spec.duplicates.unwrap_or_default() {
-            _ if repeated.are_equal => DataAction::Merged,
-            Duplicates::Mean => DataAction::Mean,
-            Duplicates::First | Duplicates::Error => DataAction::First,
-        },
+    let (count, lines) = (repeated.excess(), repeated.lines(table, MOST_PLACES));
+    let action = match entry.spec.duplicates.unwrap_or_default() {
+        _ if repeated.are_equal => MERGED,
+        Duplicates::Mean => MEAN,
+        Duplicates::First | Duplicates::Error => FIRST,
     };
-    notes.state(&file.experiment_name(experiment), &fact);
+    let repeat = if count == 1 {
+        "row repeats"
+    } else {
+        "rows repeat"
+    };
+    let text = format!(
+        "{count} {repeat} a time ({})",
+        lines_in_words(&lines, count)
+    );
+    let found = json!({"count": count, "lines": lines});
+    let fact = fact("repeated_times", &text, action, found);
+    notes.state(&entry.name(), fact);
 }
 
 /// The file of a column: its own, or that of the experiment.
 struct Source<'a> {
-    file: &'a ModelFile,
-    experiment: String,
+    entry: &'a Entry<'a>,
     /// Key of the path.
-    key: String,
+    at: Place<'a>,
     name: &'a str,
     format: TableFormat,
     /// The column, and those that are read with it.
@@ -241,36 +223,33 @@ struct Source<'a> {
 
 impl<'a> Source<'a> {
     fn of(
-        file: &'a ModelFile,
-        spec: &'a ExperimentSpec,
-        wanted: &ColumnRequest,
-        column_key: &str,
+        wanted: &ColumnRequest<'a>,
+        column: &Place<'a>,
         (id, own): (&ColumnId, Option<&'a SourceSpec>),
     ) -> Result<Self, InputError> {
-        let experiment = format!("experiments[{}]", wanted.experiment);
+        let (entry, spec) = (wanted.entry, wanted.entry.spec);
         let time = own.and_then(|s| s.time.as_ref());
         let time = time.or_else(|| spec.columns.as_ref()?.time.as_ref());
         let mut columns = vec![column_name(id)];
         columns.extend(time.map(column_name));
         columns.extend(wanted.beside.map(|(name, _)| ColumnName::from(name)));
         let own = own.and_then(|s| s.data.as_ref());
-        let key = format!("{}.data", own.map_or(&*experiment, |_| column_key));
+        let at = own.map_or(&entry.at, |_| column).below("data");
         let data = own.or(spec.data.as_ref()).ok_or_else(|| {
-            file.error_at(&experiment, "this experiment has no data")
+            (entry.at.error("this experiment has no data"))
                 .expected("`data`, a CSV file with the samples")
         })?;
         Ok(Self {
-            file,
-            key,
+            entry,
+            at,
             name: &data.0,
             format: format(spec),
             columns,
-            experiment,
         })
     }
 
     fn tables(&self, notes: &mut RecordNotes) -> Result<Rc<[Table]>, InputError> {
-        let tables = notes.tables(self.file, self.name, &self.format);
+        let tables = notes.tables(self.at.file, self.name, &self.format);
         tables.map_err(|error| self.about(error))
     }
 
@@ -279,28 +258,25 @@ impl<'a> Source<'a> {
     }
 
     fn about(&self, error: InputError) -> InputError {
-        let error = about_format(self.file, &self.experiment, error);
-        asked_for(self.file, &self.key)(error)
+        match &error.place {
+            Location::Argument(name) => {
+                let at = self.entry.at.below(&format!("format.{name}"));
+                at.file.error_about(&at.key, error)
+            }
+            _ => self.at.asks_for()(error),
+        }
     }
 }
 
 /// The rows in the window, of increasing times.
-fn inside(
-    file: &ModelFile,
-    experiment: &str,
-    spec: &ExperimentSpec,
-    times: &[f64],
-) -> Result<Range<usize>, InputError> {
-    let [from, to] = window(file, experiment, spec)?;
+fn inside(entry: &Entry<'_>, times: &[f64]) -> Result<Range<usize>, InputError> {
+    let [from, to] = window(entry)?;
     let first = times.partition_point(|t| *t < from);
     let inside = first..times.partition_point(|t| *t <= to);
     match inside.is_empty() {
         false => Ok(inside),
-        true => Err(file
-            .error_at(
-                &format!("{experiment}.window"),
-                "no sample lies in the window",
-            )
+        true => Err((entry.at)
+            .error_in("window", "no sample lies in the window")
             .found(match (from.is_finite(), to.is_finite()) {
                 (true, true) => format!("{from} s to {to} s"),
                 (true, false) => format!("from {from} s to the end of the record"),
@@ -335,17 +311,6 @@ fn format(spec: &ExperimentSpec) -> TableFormat {
     }
 }
 
-/// Moves an error about an argument of the format to its key.
-fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputError {
-    match &error.place {
-        crate::error::Location::Argument(name) => {
-            let key = format!("{experiment}.format.{name}");
-            file.error_about(&key, error)
-        }
-        _ => error,
-    }
-}
-
 struct Times {
     /// Each time once.
     values: Vec<f64>,
@@ -357,63 +322,53 @@ struct Times {
 
 /// The times of the rows, in s.
 fn times(
-    file: &ModelFile,
-    spec: &ExperimentSpec,
-    (number, experiment): (usize, &str),
+    entry: &Entry<'_>,
     own: Option<&SourceSpec>,
     table: &Table,
     notes: &mut RecordNotes,
 ) -> Result<Times, InputError> {
+    let (at, spec) = (&entry.at, entry.spec);
     let own_rate = own.and_then(|s| s.sample_rate);
     let own_column = own.and_then(|s| s.time.as_ref());
     let shared_column = spec.columns.as_ref().and_then(|c| c.time.as_ref());
     let rate = match (own_rate, own_column) {
         (Some(rate), None) => Some(rate),
         (None, Some(_)) => None,
-        (Some(_), Some(_)) => return Err(two_times(file, experiment)),
+        (Some(_), Some(_)) => return Err(two_times(at)),
         (None, None) => match (spec.sample_rate, shared_column) {
-            (Some(_), Some(_)) => return Err(two_times(file, experiment)),
+            (Some(_), Some(_)) => return Err(two_times(at)),
             (rate, _) => rate,
         },
     };
     if let Some(rate) = rate {
         if !SAMPLE_RATES.contains(&rate.0) {
-            return Err(file
-                .error_at(
-                    &format!("{experiment}.sample_rate"),
-                    "invalid sampling rate",
-                )
+            return Err(at
+                .error_in("sample_rate", "invalid sampling rate")
                 .found(format!("{:?}", rate.0))
-                .expected(rates()));
+                .expected(sample_rates()));
         }
-        let values = (0..table.rows()).map(|i| i as f64 / rate.0).collect();
-        let label = String::new();
         return Ok(Times {
-            values,
-            label,
+            values: (0..table.rows()).map(|i| i as f64 / rate.0).collect(),
+            label: String::new(),
             unit: None,
-            repeated: RepeatedTimes {
-                groups: Vec::new(),
-                are_equal: true,
-            },
+            repeated: RepeatedTimes::NONE,
         });
     }
     let default = ColumnId::Name(TIME_COLUMN.to_owned());
     let id = own_column.or(shared_column).unwrap_or(&default);
-    let key = format!("{experiment}.columns.time");
+    let named = at.below("columns.time");
     // A file that states its sampling rate needs no column of times.
     let stated = table.time_column().filter(|_| std::ptr::eq(id, &default));
     let index = stated.map_or_else(|| table.find(&column_name(id)), Ok);
     let index = index.map_err(|error| {
-        let error = asked_for(file, &key)(error);
+        let error = named.asks_for()(error);
         match own_column.or(shared_column) {
             None => error.hint("name it with `columns: {time: …}`, or give `sample_rate: …`"),
             Some(_) => error,
         }
     })?;
     let column = QuantityColumn {
-        file,
-        experiment,
+        at,
         name: "time",
         kind: Quantity::Time,
         given: spec.units.as_ref().and_then(|u| u.time.as_ref()),
@@ -422,15 +377,18 @@ fn times(
     };
     let unit = column.unit(&mut notes.warnings)?;
     let duplicates = spec.duplicates.unwrap_or_default();
-    let repeated = repeated_times(table, index, duplicates).map_err(asked_for(file, &key))?;
-    let values = table.values(index).map_err(asked_for(file, &key))?;
+    let repeated = repeated_times(table, index, duplicates).map_err(named.asks_for())?;
+    let values = table.values(index).map_err(named.asks_for())?;
     let mut values = repeated.merged(values, Duplicates::First);
     if let Some(exact) = without_rounding(&values) {
-        let fact = DataFact::RoundedTimes {
-            digits: exact.digits,
-            rate: 1.0 / (exact.step * unit.factor()),
-        };
-        notes.state(&file.experiment_name(number), &fact);
+        let (digits, rate) = (exact.digits, 1.0 / (exact.step * unit.factor()));
+        let text = format!(
+            "times printed with {digits} decimals: taken as equally spaced, at {} Hz",
+            significant(rate, 9)
+        );
+        let found = json!({"digits": digits, "rate": rate});
+        let fact = Finding::having("rounded_times", text, found);
+        notes.state(&entry.name(), fact);
         values = exact.times.into();
     }
     Ok(Times {
@@ -441,15 +399,9 @@ fn times(
     })
 }
 
-/// The sampling rates that are accepted, for messages.
-fn rates() -> String {
-    let (least, most) = (SAMPLE_RATES.start(), SAMPLE_RATES.end());
-    format!("samples per second, a number from {least:e} to {most:e}")
-}
-
-fn two_times(file: &ModelFile, experiment: &str) -> InputError {
-    file.error_at(
-        &format!("{experiment}.sample_rate"),
+fn two_times(at: &Place<'_>) -> InputError {
+    at.error_in(
+        "sample_rate",
         "both a sampling rate and a column of times are given",
     )
     .found("`sample_rate` beside a column of times")
@@ -457,19 +409,15 @@ fn two_times(file: &ModelFile, experiment: &str) -> InputError {
 }
 
 /// First and last time of the window, on the time axis of the file.
-pub fn window(
-    file: &ModelFile,
-    experiment: &str,
-    spec: &ExperimentSpec,
-) -> Result<[f64; 2], InputError> {
-    let Some(window) = &spec.window else {
+pub fn window(entry: &Entry<'_>) -> Result<[f64; 2], InputError> {
+    let Some(window) = &entry.spec.window else {
         return Ok([f64::NEG_INFINITY, f64::INFINITY]);
     };
     let from = window.min.map_or(f64::NEG_INFINITY, |t| t.0);
     let to = window.max.map_or(f64::INFINITY, |t| t.0);
     if from >= to {
-        return Err(file
-            .error_at(&format!("{experiment}.window"), "the window is empty")
+        return Err((entry.at)
+            .error_in("window", "the window is empty")
             .found(format!("{from} s to {to} s"))
             .expected("`min` less than `max`"));
     }

@@ -1,8 +1,6 @@
 //! Data checks of a record.
 
-use super::channel::quantity;
-use super::warning::DataWarning;
-use super::{RawChannel, RawRecord, is_equation_error};
+use super::{Entry, RawChannel, RawRecord, is_equation_error, sensor_of};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
 use crate::config::dominant::Oscillation;
@@ -14,13 +12,14 @@ use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
-use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::record::{ChannelKind, Loss};
 use kmcfit_core::internals::signal::{
     Interpolation, Signal, Spectrum, driven_oscillator, is_kept_up, median, onset,
     two_forced_modes, two_modes,
 };
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::both;
+use serde_json::json;
 use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};
 
@@ -56,9 +55,9 @@ const OPPOSITE: f64 = 0.7;
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
-/// Warnings about the record of experiment `i`.
-pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
-    let name = file.experiment_name(i);
+/// Warnings about the record of an experiment.
+pub fn of(entry: &Entry<'_>, record: &RawRecord) -> Vec<Finding> {
+    let (file, spec) = (entry.at.file, entry.spec);
     let of_units = || {
         let spectra = ChannelSpectra::of(record);
         let mut warnings = unit_factors(spec, record, &spectra);
@@ -68,7 +67,7 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
         warnings
     };
     let of_motion = || {
-        let mut warnings: Vec<DataWarning> = missing_codes(record).into_iter().collect();
+        let mut warnings: Vec<Finding> = missing_codes(record).into_iter().collect();
         if warnings.is_empty() {
             let outliers = record.channels.iter().filter_map(|c| outliers(spec, c));
             warnings.extend(outliers);
@@ -84,14 +83,12 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
     };
     let (mut warnings, others) = both(of_units, of_motion);
     warnings.extend(others);
-    let place = format!("experiments[{i}] ({name})");
-    let each = warnings.iter();
-    each.map(|warning| warning.at(&place).with("experiment", &name))
-        .collect()
+    let each = warnings.into_iter();
+    each.map(|warning| entry.placed(warning)).collect()
 }
 
 /// A constraint of the natural frequency that excludes the frequency of a free record.
-fn excluded_frequency(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
+fn excluded_frequency(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     let constraints = file.spec.constraints.iter().flatten();
     let mut ranges = constraints.filter_map(|constraint| constraint.frequency.as_ref());
     let channel = record.channels.first().filter(|_| record.is_free())?;
@@ -105,12 +102,18 @@ fn excluded_frequency(file: &ModelFile, record: &RawRecord) -> Option<DataWarnin
         let is_above = max.is_some_and(|max| frequency - error > max);
         (is_below || is_above).then_some([min, max])
     })?;
-    Some(DataWarning::FrequencyExcluded {
-        channel: channel.kind.name(),
-        frequency,
-        min: range[0],
-        max: range[1],
-    })
+    let (channel, [min, max]) = (channel.kind.name(), range);
+    let limits = match (min, max) {
+        (Some(min), Some(max)) => format!("{min} to {max} Hz"),
+        (Some(min), None) => format!("at least {min} Hz"),
+        (None, max) => format!("at most {} Hz", max.unwrap_or_default()),
+    };
+    let text = format!(
+        "the {channel} vibrates at {} Hz, which the constraint on the natural frequency ({limits}) excludes",
+        significant(frequency, 3)
+    );
+    let found = json!({"channel": channel, "frequency": frequency, "min": min, "max": max});
+    Some(Finding::having("frequency_excluded", text, found))
 }
 
 /// Spectra of the channels of a record, each computed where it is first needed.
@@ -135,15 +138,15 @@ fn unit_factors(
     spec: &ExperimentSpec,
     record: &RawRecord,
     spectra: &ChannelSpectra,
-) -> Vec<DataWarning> {
+) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut add = |ratio: f64, quantity: String| {
         if let Some(factor) = factor_near(ratio, record) {
-            found.push(DataWarning::SuspiciousFactor {
-                quantity,
-                ratio,
-                factor,
-            });
+            let times = significant(ratio, 4);
+            let text =
+                format!("{quantity} is {times} times its expected value, {factor}; check `units`");
+            let of = json!({"quantity": quantity, "ratio": ratio, "factor": factor});
+            found.push(Finding::having("suspicious_factor", text, of));
         }
     };
     let first = |kind: ChannelKind| record.channels.iter().find(|c| c.kind == kind);
@@ -193,13 +196,13 @@ fn factor_near(ratio: f64, record: &RawRecord) -> Option<&'static str> {
 }
 
 /// Magnitudes outside the range of mechanical vibrations, and mains hum at a frequency that it has in another unit of time.
-fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<DataWarning> {
+fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
     let Some(first) = record.channels.first() else {
         return Vec::new();
     };
     let all = record.channels.iter().filter(|c| !c.unit.is_arbitrary());
     let all: Vec<Magnitude> = all
-        .filter_map(|c| Magnitude::of(quantity(c.kind), c.unit, &c.values))
+        .filter_map(|c| Magnitude::of(c.kind.into(), c.unit, &c.values))
         .collect();
     let pairs = first
         .times
@@ -212,24 +215,30 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<DataWarning> 
     let frequencies = oscillation.frequencies();
     let found = frequencies.and_then(|both| implausible(both, first.time_unit, &all));
     if let Some(found) = found {
-        return vec![DataWarning::ImplausibleMagnitudes {
-            magnitudes: found.magnitudes,
-            reading: found.reading,
-        }];
+        let (magnitudes, reading) = (found.magnitudes, found.reading);
+        let read = reading.as_ref().map(|reading| format!(": {reading}"));
+        let read = read.unwrap_or_default();
+        let text = format!("{magnitudes} is implausible{read}; check `units`");
+        let found = json!({"magnitudes": magnitudes, "reading": reading});
+        return vec![Finding::having("implausible_magnitudes", text, found)];
     }
     let hum = first
         .time_unit
         .and_then(|unit| mains_hum(spectra.at(first.kind)?, unit));
-    let hum = hum.map(|(frequency, unit)| DataWarning::MainsHum {
-        channel: first.kind.name(),
-        frequency,
-        unit: unit.symbol().into(),
+    let hum = hum.map(|(frequency, unit)| {
+        let (channel, unit) = (first.kind.name(), unit.symbol());
+        let text = format!(
+            "the {channel} has a narrow line at {} Hz: mains hum, if the times are in {unit}; check `units: {{time: {unit}}}`",
+            significant(frequency, 3)
+        );
+        let found = json!({"channel": channel, "frequency": frequency, "unit": unit});
+        Finding::having("mains_hum", text, found)
     });
     hum.into_iter().collect()
 }
 
 /// The mass that the measured force and the first channel imply, where it differs from the stated one by the factor between two units.
-fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
+fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     let stated = match file.spec.functions.mass.fixed.as_ref()? {
         KnownValue::Number(number) => number.0,
         KnownValue::Map(map) => map.value?.0,
@@ -237,15 +246,17 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
     };
     let channel = record.channels.first()?;
     let spacing = channel.spacing?;
-    let force = record.excitation.forces_at(&channel.times)?;
+    let force = record.forces_at(&channel.times)?;
     let [implied, ..] = driven_oscillator(&force, &channel.values, spacing, channel.kind as i32)?;
-    let ratio = implied / stated;
-    Some(DataWarning::SuspiciousMass {
-        channel: channel.kind.name(),
-        implied,
-        ratio,
-        factor: factor_near(ratio, record)?,
-    })
+    let (channel, ratio) = (channel.kind.name(), implied / stated);
+    let factor = factor_near(ratio, record)?;
+    let text = format!(
+        "the force and the {channel} imply a mass of {} kg, {} times the stated one, {factor}; check `units` and the mass",
+        significant(implied, 3),
+        significant(ratio, 3)
+    );
+    let found = json!({"channel": channel, "implied": implied, "ratio": ratio, "factor": factor});
+    Some(Finding::having("suspicious_mass", text, found))
 }
 
 /// Pairs of channels of one response with opposite signs.
@@ -253,7 +264,7 @@ fn opposite_signs(
     spec: &ExperimentSpec,
     record: &RawRecord,
     spectra: &ChannelSpectra,
-) -> Vec<DataWarning> {
+) -> Vec<Finding> {
     let channels = &record.channels;
     let pairs = (channels.iter().enumerate())
         .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
@@ -264,22 +275,19 @@ fn opposite_signs(
             one * other * correlation.unwrap_or_default() < -OPPOSITE
         })
     });
-    let warnings = opposite.map(|(low, high)| DataWarning::OppositeSign {
-        high: high.kind.name(),
-        low: low.kind.name(),
+    let warnings = opposite.map(|pair| {
+        let (low, high) = (pair.0.kind.name(), pair.1.kind.name());
+        let text = format!(
+            "{high} and {low} have opposite signs; if the {high} is reversed, add `sensors: {{{high}: {{gain: -1}}}}`"
+        );
+        Finding::having("opposite_sign", text, json!({"high": high, "low": low}))
     });
     warnings.collect()
 }
 
 /// Sign of a sensor's gain; `None` if the gain is estimated.
 fn gain_sign(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
-    let sensors = spec.sensors.as_ref();
-    let sensor = sensors.and_then(|sensors| match kind {
-        ChannelKind::Displacement => sensors.displacement.as_ref(),
-        ChannelKind::Velocity => sensors.velocity.as_ref(),
-        ChannelKind::Acceleration => sensors.acceleration.as_ref(),
-    });
-    match sensor.and_then(|sensor| sensor.gain.as_ref()) {
+    match sensor_of(spec, kind).and_then(|sensor| sensor.gain.as_ref()) {
         None => Some(1.0),
         Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.0.signum()),
         Some(_) => None,
@@ -325,19 +333,22 @@ fn correlation_with_estimate(
 }
 
 /// A record without an input that a random force keeps up.
-fn unmeasured_force(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
+fn unmeasured_force(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
     let mut channels = record.channels.iter();
     let is_affected = |c: &&RawChannel| c.spacing.is_some_and(|s| is_kept_up(&c.values, s));
     let found = channels.find(|c| !has_input(spec, record) && is_affected(c))?;
-    Some(DataWarning::UnmeasuredForce {
-        channel: found.kind.name(),
-    })
+    let channel = found.kind.name();
+    let text = format!(
+        "no force is measured, and the {channel} does not decay: an unmeasured force acts, with which neither a free response nor the \
+         equation error determines the damping; `fit: {{method: equation-error}}` gives the natural frequency"
+    );
+    Some(Finding::new("unmeasured_force", text).with("channel", channel))
 }
 
 /// Codes for missing samples, which no statement of the model takes as such.
-fn missing_codes(record: &RawRecord) -> Option<DataWarning> {
+fn missing_codes(record: &RawRecord) -> Option<Finding> {
     let (mut channels, mut codes): (Vec<String>, Vec<f64>) = Default::default();
-    for channel in record.channels.iter().filter(|c| c.is_squared()) {
+    for channel in record.channels.iter().filter(|c| c.loss == Loss::Squares) {
         // Digits of the file, without the rounding of the conversion to SI.
         let in_file = |x: &f64| significant(x / channel.unit.factor(), 12).parse();
         let values: Vec<f64> = (channel.values.iter())
@@ -351,43 +362,58 @@ fn missing_codes(record: &RawRecord) -> Option<DataWarning> {
     }
     codes.sort_by(f64::total_cmp);
     codes.dedup();
-    (!codes.is_empty()).then_some(DataWarning::MissingCodes { channels, codes })
+    let all = codes.iter().map(|code| format!("{code:?}"));
+    let text = format!(
+        "the {} holds the value {} far outside the others, which stands for a missing sample: `missing: {}`",
+        channels.join(" and the "),
+        all.collect::<Vec<_>>().join(" and "),
+        json!(codes)
+    );
+    let found = json!({"channels": channels, "codes": codes});
+    (!codes.is_empty()).then(|| Finding::having("missing_codes", text, found))
 }
 
 /// A free record, or one with a measured force, in which two modes vibrate.
-fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
+fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
     let of_channel = |c: &RawChannel| {
         if !has_input(spec, record) {
             return two_modes(&c.values, c.median_spacing);
         }
-        let force = record.excitation.forces_at(&c.times)?;
+        let force = record.forces_at(&c.times)?;
         two_forced_modes(&force, &c.values, c.median_spacing, c.kind as i32)
     };
     let each = record.channels.iter().filter(|c| c.spacing.is_some());
     let mut found = each.filter_map(|c| Some((c, of_channel(c)?)));
     let (channel, frequencies) = found.next()?;
-    Some(DataWarning::TwoModes {
-        channel: channel.kind.name(),
-        frequencies,
-    })
+    let (channel, [first, second]) = (channel.kind.name(), frequencies);
+    let text = format!(
+        "two modes vibrate in the {channel}, at {} and {} Hz; the model has one; keep one by `band`, or measure at a node of the \
+         other",
+        significant(first, 3),
+        significant(second, 3)
+    );
+    let found = json!({"channel": channel, "frequencies": frequencies});
+    Some(Finding::having("two_modes", text, found))
 }
 
 fn has_input(spec: &ExperimentSpec, record: &RawRecord) -> bool {
-    !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some()
+    !record.is_free() || spec.force.is_some() || spec.base.is_some()
 }
 
 /// A free record that begins at rest, before the release or the impact.
-fn rest_before_motion(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
+fn rest_before_motion(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
     if has_input(spec, record) {
         return None;
     }
     let mut channels = record.channels.iter();
     let (channel, first) = channels.find_map(|c| Some((c, onset(&c.values, c.median_spacing)?)))?;
-    let from = in_file(spec, channel, first);
-    Some(DataWarning::AtRest {
-        channel: channel.kind.name(),
-        start: from,
-    })
+    let (start, channel) = (in_file(spec, channel, first), channel.kind.name());
+    let text = format!(
+        "the {channel} is at rest before {start} s; a free decay must begin after the release or impact: `window: {{min: \
+         {start}}}`"
+    );
+    let found = json!({"channel": channel, "start": start});
+    Some(Finding::having("at_rest", text, found))
 }
 
 /// Time of a sample on the time axis of its file, s.
@@ -397,20 +423,37 @@ fn in_file(spec: &ExperimentSpec, channel: &RawChannel, sample: usize) -> f64 {
 }
 
 /// Outliers of a channel with a quadratic loss.
-fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> {
-    if !channel.is_squared() {
+fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<Finding> {
+    if channel.loss != Loss::Squares {
         return None;
     }
     let level = median(channel.values.as_slice());
     let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
     let far = outlier_indices(&away);
     let first = *far.first()?;
-    Some(DataWarning::Outliers {
-        channel: channel.kind.name(),
-        samples: far.len(),
-        first_value: channel.values[first] / channel.unit.factor(),
-        first_time: in_file(spec, channel, first),
-        unit: channel.unit.symbol().into(),
-        has_sigma: channel.weighting.is_some(),
-    })
+    let (kind, samples, unit) = (channel.kind.name(), far.len(), channel.unit.symbol());
+    let value = channel.values[first] / channel.unit.factor();
+    let time = in_file(spec, channel, first);
+    let [end, them] = if samples == 1 {
+        ["", "it"]
+    } else {
+        ["s", "them"]
+    };
+    let with_sigma = match channel.weighting {
+        Some(_) => "",
+        None => ", with `sigma`",
+    };
+    let text = format!(
+        "{samples} outlier{end} in the {kind}, the first {} {unit} at {time} s; delete {them} (empty fields) or use a \
+         robust loss (`loss: {{{kind}: huber}}`{with_sigma})",
+        significant(value, 4),
+    );
+    let found = json!({
+        "channel": kind,
+        "samples": samples,
+        "first_value": value,
+        "first_time": time,
+        "unit": unit
+    });
+    Some(Finding::having("outliers", text, found))
 }

@@ -3,11 +3,11 @@
 use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::number_format::significant;
-use crate::tables::{Table, TableFormat, lines_in_words};
+use crate::number_format::{count as counted, significant};
+use crate::tables::{Table, TableFormat};
 use serde::Serialize;
+use serde_json::Value;
 use std::rc::Rc;
-use thiserror::Error;
 
 /// Most places that a fact lists.
 pub const MOST_PLACES: usize = 1000;
@@ -54,56 +54,38 @@ impl RecordNotes {
     }
 
     /// Adds a fact, unless another channel of the same file has stated it.
-    pub fn state(&mut self, experiment: &str, fact: &DataFact) {
-        let text = format!("{experiment}: {fact}");
-        let finding = Finding::of(fact, text).with("experiment", experiment);
-        if !self.data.contains(&finding) {
-            self.data.push(finding);
+    pub fn state(&mut self, experiment: &str, fact: Finding) {
+        let text = format!("{experiment}: {}", fact.text);
+        let fact = Finding { text, ..fact }.with("experiment", experiment);
+        if !self.data.contains(&fact) {
+            self.data.push(fact);
         }
     }
 }
 
-/// What was done with faulty samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DataAction {
-    /// Used as they are.
-    Used,
-    /// Left out of the fit.
-    Excluded,
-    /// Equal rows were merged.
-    Merged,
-    /// The first of the rows is used.
-    First,
-    /// The mean of the rows is used.
-    Mean,
-    /// Treated as missing samples.
-    Missing,
-    /// The input is interpolated across the gap.
-    Interpolated,
-    /// Its variance was added to that of the stated sigma.
-    AddedToSigma,
-    /// Its standard deviation is the smallest one of an estimated sigma.
-    LeastSigma,
-    /// Times were shifted.
-    Shifted,
-}
+/// What was done with samples: its name, and in words.
+pub type Action = (&'static str, &'static str);
+pub const USED: Action = ("used", "used as they are");
+pub const EXCLUDED: Action = ("excluded", "left out");
+pub const MERGED: Action = ("merged", "equal in every column, merged");
+pub const FIRST: Action = ("first", "the first row of each time is used");
+pub const MEAN: Action = ("mean", "the mean of the rows of each time is used");
+pub const MISSING: Action = ("missing", "treated as missing samples");
+pub const INTERPOLATED: Action = ("interpolated", "interpolated");
+/// The variance of a quantisation error in that of a stated sigma, and its standard deviation as the smallest of an estimated one.
+pub const ADDED_TO_SIGMA: Action = (
+    "added_to_sigma",
+    "its variance, step^2/12, is added to that of sigma",
+);
+pub const LEAST_SIGMA: Action = (
+    "least_sigma",
+    "an estimated sigma is at least step/sqrt(12)",
+);
 
-impl DataAction {
-    fn words(self) -> &'static str {
-        match self {
-            Self::Used => "used as they are",
-            Self::Excluded => "left out",
-            Self::Merged => "equal in every column, merged",
-            Self::First => "the first row of each time is used",
-            Self::Mean => "the mean of the rows of each time is used",
-            Self::Missing => "treated as missing samples",
-            Self::Interpolated => "interpolated",
-            Self::AddedToSigma => "its variance, step^2/12, is added to that of sigma",
-            Self::LeastSigma => "an estimated sigma is at least step/sqrt(12)",
-            Self::Shifted => "shifted",
-        }
-    }
+/// A fact about the data of one experiment, and what was done. Times are those of the file, s; values are in the unit of the column.
+pub fn fact(kind: &str, text: &str, action: Action, quantities: Value) -> Finding {
+    let (name, words) = action;
+    Finding::having(kind, format!("{text}: {words}"), quantities).with("action", name)
 }
 
 /// A gap in the times of a channel.
@@ -117,87 +99,13 @@ pub struct GapPlace {
     pub samples: usize,
 }
 
-/// A fact about the data of one experiment. Times are those of the file, s; values are in the unit of the column.
-#[derive(Debug, Clone, PartialEq, Serialize, Error)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum DataFact {
-    /// Rows that repeat a time.
-    #[error("{count} {} a time ({}): {}", if *count == 1 { "row repeats" } else { "rows repeat" }, lines_in_words(lines, *count), action.words())]
-    RepeatedTimes {
-        count: usize,
-        lines: Vec<usize>,
-        action: DataAction,
-    },
-    /// Times that are equally spaced but for the rounding of their printed digits.
-    #[error("times printed with {digits} decimals: taken as equally spaced, at {} Hz", significant(*rate, 9))]
-    RoundedTimes { digits: usize, rate: f64 },
-    /// Treatment of a file when it is read: common times, units of clocks, lines that are left out.
-    #[error("{text}")]
-    File { text: String },
-    /// Gaps in the times or samples of a channel.
-    #[error("{} in the {channel}, {}: {}", counted(*count, "gap"), gaps_in_words(places, *count), action.words())]
-    Gaps {
-        channel: String,
-        count: usize,
-        places: Vec<GapPlace>,
-        action: DataAction,
-    },
-    /// Samples held at a constant value.
-    #[error("{} of the {channel} held at a constant value, {}: {}", counted(*count, "sample"), spans_in_words(places), action.words())]
-    Dropouts {
-        channel: String,
-        count: usize,
-        places: Vec<[f64; 2]>,
-        action: DataAction,
-    },
-    /// Single samples far from their neighbours.
-    #[error("{} in the {channel}, at {} s: {}", counted(*count, "spike"), times_in_words(places, *count), action.words())]
-    Spikes {
-        channel: String,
-        count: usize,
-        places: Vec<f64>,
-        action: DataAction,
-    },
-    /// Samples at an end of the range.
-    #[error("{} of the {channel} at its extreme value {} {unit}: {}", counted(*count, "sample"), significant(*level, 4), action.words())]
-    Saturation {
-        channel: String,
-        count: usize,
-        level: f64,
-        unit: String,
-        action: DataAction,
-    },
-    /// Samples that are multiples of a step.
-    #[error("{channel} quantised in steps of {} {unit}: {}", significant(*step, 3), action.words())]
-    Quantisation {
-        channel: String,
-        step: f64,
-        unit: String,
-        /// Standard deviation of the error, step/sqrt(12), relative to that of the samples.
-        share: f64,
-        action: DataAction,
-    },
-    /// A stated delay.
-    #[error("times of the {channel} {} by its delay of {} s", action.words(), significant(*seconds, 6))]
-    Delay {
-        channel: String,
-        seconds: f64,
-        action: DataAction,
-    },
-}
-
-fn counted(count: usize, name: &str) -> String {
-    match count {
-        1 => format!("1 {name}"),
-        _ => format!("{count} {name}s"),
-    }
-}
-
-fn time(t: f64) -> String {
+/// A time, s.
+pub fn time(t: f64) -> String {
     significant(t, 6)
 }
 
-fn gaps_in_words(places: &[GapPlace], count: usize) -> String {
+/// The first gaps of all.
+pub fn gaps_in_words(places: &[GapPlace], count: usize) -> String {
     let each = places.iter().take(IN_WORDS).map(|gap| {
         let (from, to) = (time(gap.from), time(gap.to));
         let length = significant(gap.to - gap.from, 3);
@@ -209,13 +117,15 @@ fn gaps_in_words(places: &[GapPlace], count: usize) -> String {
     listed(each.collect(), count)
 }
 
-fn spans_in_words(places: &[[f64; 2]]) -> String {
+/// The first spans of all.
+pub fn spans_in_words(places: &[[f64; 2]]) -> String {
     let each = places.iter().take(IN_WORDS);
     let each = each.map(|[from, to]| format!("{} to {} s", time(*from), time(*to)));
     listed(each.collect(), places.len())
 }
 
-fn times_in_words(places: &[f64], count: usize) -> String {
+/// The first times of all.
+pub fn times_in_words(places: &[f64], count: usize) -> String {
     listed(
         places.iter().take(IN_WORDS).map(|t| time(*t)).collect(),
         count,

@@ -1,16 +1,17 @@
 //! Delays of channels and inputs: stated ones shift the times, estimated ones leave out the samples that they may move out of the record.
 
-use super::RawRecord;
-use super::data_facts::{DataAction, DataFact, RecordNotes};
-use crate::config::ModelFile;
+use super::data_facts::{RecordNotes, time};
+use super::{Entry, RawRecord};
 use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{DelayValue, ExperimentSpec, InputSensorSpec};
 use crate::config::values::NumberOrEstimate;
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::builder::ScalarSpec;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::system::Grid;
+use serde_json::json;
 use std::sync::Arc;
 
 /// Default limit of an estimated delay, in samples.
@@ -62,28 +63,17 @@ impl Delay {
     }
 }
 
-/// The delay of a channel of experiment `i`, with samples `spacing` (s) apart.
-pub fn of_channel(
-    file: &ModelFile,
-    i: usize,
-    kind: ChannelKind,
-    spacing: f64,
-) -> Result<Delay, InputError> {
-    let spec = &file.spec.experiments[i];
-    let given = super::channel::sensor_of(spec, kind).and_then(|sensor| sensor.delay.as_ref());
-    let key = format!("experiments[{i}].sensors.{}.delay", kind.name());
-    delay(file, &key, given, spacing)
+/// The delay of a channel of an experiment, with samples `spacing` (s) apart.
+pub fn of_channel(entry: &Entry<'_>, kind: ChannelKind, spacing: f64) -> Result<Delay, InputError> {
+    let given = super::channel::sensor_of(entry.spec, kind).and_then(|s| s.delay.as_ref());
+    delay(entry, kind.name(), given, spacing)
 }
 
-/// The delay of the input of experiment `i`.
-pub fn of_input(file: &ModelFile, i: usize, spacing: f64) -> Result<Delay, InputError> {
-    let spec = &file.spec.experiments[i];
-    match input_sensor(spec) {
+/// The delay of the input of an experiment.
+pub fn of_input(entry: &Entry<'_>, spacing: f64) -> Result<Delay, InputError> {
+    match input_sensor(entry.spec) {
         None => Ok(Delay::Known(0.0)),
-        Some((name, sensor)) => {
-            let key = format!("experiments[{i}].sensors.{name}.delay");
-            delay(file, &key, sensor.delay.as_ref(), spacing)
-        }
+        Some((name, sensor)) => delay(entry, name, sensor.delay.as_ref(), spacing),
     }
 }
 
@@ -101,8 +91,8 @@ fn input_sensor(spec: &ExperimentSpec) -> Option<(&'static str, &InputSensorSpec
 }
 
 fn delay(
-    file: &ModelFile,
-    key: &str,
+    entry: &Entry<'_>,
+    sensor: &str,
     given: Option<&DelayValue>,
     spacing: f64,
 ) -> Result<Delay, InputError> {
@@ -130,16 +120,19 @@ fn delay(
     let is_inside = least < most && (least..=most).contains(&start);
     match is_inside {
         true => Ok(Delay::Estimated { start, range }),
-        false => Err(file
-            .error_at(key, "the limits of the delay do not hold its start")
+        false => Err((entry.at)
+            .error_in(
+                &format!("sensors.{sensor}.delay"),
+                "the limits of the delay do not hold its start",
+            )
             .found(format!("min {least} s, start {start} s, max {most} s"))
             .expected("`min` less than `max`, with `start` between them")),
     }
 }
 
 /// Refuses a sensor of an input that the experiment does not measure.
-pub fn check_input(file: &ModelFile, i: usize, record: &RawRecord) -> Result<(), InputError> {
-    let spec = &file.spec.experiments[i];
+pub fn check_input(entry: &Entry<'_>, record: &RawRecord) -> Result<(), InputError> {
+    let spec = entry.spec;
     let Some((name, _)) = input_sensor(spec) else {
         return Ok(());
     };
@@ -149,20 +142,17 @@ pub fn check_input(file: &ModelFile, i: usize, record: &RawRecord) -> Result<(),
         "base_acceleration" => c.base_acceleration.is_some(),
         _ => c.base_displacement.is_some(),
     });
-    let key = format!("experiments[{i}].sensors.{name}");
+    let at = entry.at.below(&format!("sensors.{name}"));
     let in_words = name.replace('_', " ");
     if !has_column {
-        return Err(file
-            .error_at(
-                &key,
-                format!("the {in_words} has no column, so it is not read"),
-            )
+        return Err(at
+            .error(format!("the {in_words} has no column, so it is not read"))
             .found(format!("a sensor of the {in_words}"))
             .expected(format!("`columns: {{{name}: …}}`, or leave the key out")));
     }
     if record.has_two_inputs() {
-        return Err(file
-            .error_at(&key, "the delay of an input needs one input")
+        return Err(at
+            .error("the delay of an input needs one input")
             .found("a force and a motion of the base")
             .expected("one input, or delays of the channels"));
     }
@@ -171,24 +161,23 @@ pub fn check_input(file: &ModelFile, i: usize, record: &RawRecord) -> Result<(),
 
 /// Applies stated delays to the times of the channels, and leaves out samples that a delay moves out of the record.
 pub fn apply(
-    file: &ModelFile,
-    i: usize,
+    entry: &Entry<'_>,
     record: &mut RawRecord,
     notes: &mut RecordNotes,
 ) -> Result<(), InputError> {
-    check_input(file, i, record)?;
+    check_input(entry, record)?;
     let (start, end) = (record.start(), record.end());
-    let input = of_input(file, i, record.spacing())?;
-    let spec = &file.spec.experiments[i];
+    let input = of_input(entry, record.spacing())?;
+    let spec = entry.spec;
     if let (Delay::Known(seconds), Some((name, _))) = (input, input_sensor(spec))
         && seconds != 0.0
     {
-        state(file, i, &name.replace('_', " "), seconds, notes);
+        state(entry, &name.replace('_', " "), seconds, notes);
     }
     for channel in &mut record.channels {
-        let own = of_channel(file, i, channel.kind, channel.median_spacing)?;
+        let own = of_channel(entry, channel.kind, channel.median_spacing)?;
         if own.known() != 0.0 {
-            state(file, i, channel.kind.name(), own.known(), notes);
+            state(entry, channel.kind.name(), own.known(), notes);
         }
         let shift = own.known() - input.known();
         let least = shift + own.range()[0] - input.range()[1];
@@ -202,9 +191,8 @@ pub fn apply(
             .filter(|i| stays(&channel.times[*i]))
             .collect();
         if kept.len() < Grid::FEWEST_NODES {
-            let key = format!("experiments[{i}].sensors");
-            return Err(file
-                .error_at(&key, "the delays leave too few samples")
+            return Err((entry.at)
+                .error_in("sensors", "the delays leave too few samples")
                 .found(format!(
                     "{} of {} samples of the {} within the record for delays from {} to {} s",
                     kept.len(),
@@ -220,13 +208,13 @@ pub fn apply(
     Ok(())
 }
 
-fn state(file: &ModelFile, i: usize, channel: &str, seconds: f64, notes: &mut RecordNotes) {
-    let fact = DataFact::Delay {
-        channel: channel.to_owned(),
-        seconds,
-        action: DataAction::Shifted,
-    };
-    notes.state(&file.experiment_name(i), &fact);
+fn state(entry: &Entry<'_>, channel: &str, seconds: f64, notes: &mut RecordNotes) {
+    let text = format!(
+        "times of the {channel} shifted by its delay of {} s",
+        time(seconds)
+    );
+    let found = json!({"channel": channel, "seconds": seconds, "action": "shifted"});
+    notes.state(&entry.name(), Finding::having("delay", text, found));
 }
 
 impl super::RawChannel {
@@ -247,12 +235,8 @@ impl super::RawChannel {
 }
 
 /// Limits of the estimated delays of a model, by the names of their parameters.
-pub fn limits(
-    file: &ModelFile,
-    i: usize,
-    record: &RawRecord,
-) -> Result<Vec<DelayLimits>, InputError> {
-    let name = file.experiment_name(i);
+pub fn limits(entry: &Entry<'_>, record: &RawRecord) -> Result<Vec<DelayLimits>, InputError> {
+    let name = entry.name();
     let of = |delay: Delay, channel: &str| match delay {
         Delay::Known(_) => None,
         Delay::Estimated { range, .. } => Some(DelayLimits {
@@ -260,15 +244,15 @@ pub fn limits(
             range,
         }),
     };
-    let spec = &file.spec.experiments[i];
+    let spec = entry.spec;
     let input = match input_sensor(spec) {
         Some(("force", _)) => "force",
         _ => "base motion",
     };
     let mut found = Vec::new();
-    found.extend(of(of_input(file, i, record.spacing())?, input));
+    found.extend(of(of_input(entry, record.spacing())?, input));
     for channel in &record.channels {
-        let delay = of_channel(file, i, channel.kind, channel.median_spacing)?;
+        let delay = of_channel(entry, channel.kind, channel.median_spacing)?;
         found.extend(of(delay, channel.kind.name()));
     }
     Ok(found)

@@ -1,118 +1,37 @@
 //! Excitation of an experiment: force and base motion.
 
+use super::Entry;
 use super::column_samples::{self, ColumnRequest, ColumnSamples};
-use super::data_facts::{DataAction, DataFact, RecordNotes};
+use super::data_facts::{RecordNotes, USED};
 use super::faults::{Column, is_coarse, quantisation_step};
-use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::config::values::Number;
 use crate::error::InputError;
 use crate::units::Quantity;
-use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use std::ops::Range;
-use std::sync::Arc;
 
-/// Excitation of an experiment, as samples or shapes.
-#[derive(Debug, Default, Clone)]
-pub struct RawExcitation {
-    input: Input,
-}
-
-impl RawExcitation {
-    /// True for a free response.
-    pub fn is_empty(&self) -> bool {
-        self.input.force.is_none() && self.input.base.is_none()
-    }
-
-    /// Shares the times of a channel, s, with the signals that have the same.
-    pub fn share_times(&mut self, times: &Arc<Vec<f64>>) {
-        self.input.share_times(times);
-    }
-
-    /// Force and motion of the base.
-    pub fn into_input(self) -> Input {
-        self.input
-    }
-
-    /// True for a force and a motion of the base.
-    pub fn has_two_inputs(&self) -> bool {
-        self.input.force.is_some() && self.input.base.is_some()
-    }
-
-    /// Samples of the force, if it alone acts.
-    pub fn force(&self) -> Option<&Signal> {
-        match &self.input {
-            Input {
-                force: Some(Waveform::Samples(signal)),
-                base: None,
-            } => Some(signal),
-            _ => None,
-        }
-    }
-
-    /// The measured input and its name, if it is one series of samples.
-    pub fn samples(&self) -> Option<(&'static str, &Signal)> {
-        match (&self.input.force, &self.input.base) {
-            (Some(Waveform::Samples(signal)), None) => Some(("force", signal)),
-            (None, Some(BaseMotion::Acceleration(signal))) => Some(("base_acceleration", signal)),
-            (None, Some(BaseMotion::Displacement(signal))) => Some(("base_displacement", signal)),
-            _ => None,
-        }
-    }
-
-    /// Forces (N) at some times (s), if measured and if no other input acts.
-    pub fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
-        self.force()?;
-        self.input.forces_at(times)
-    }
-
-    /// Sampling interval of equally spaced samples, s.
-    pub fn spacing(&self) -> Option<f64> {
-        let force = match &self.input.force {
-            Some(Waveform::Samples(signal)) => Some(signal),
-            _ => None,
-        };
-        let base = match &self.input.base {
-            Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) => {
-                Some(signal)
-            }
-            None => None,
-        };
-        let times = force.or(base)?.times();
-        let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;
-        let regular = times
-            .windows(2)
-            .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
-        (regular && spacing > 0.0).then_some(spacing)
-    }
-}
-
-/// Reads the excitation of experiment `i`.
-pub fn read(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    notes: &mut RecordNotes,
-) -> Result<RawExcitation, InputError> {
-    let key = format!("experiments[{i}]");
+/// Reads the excitation of an experiment.
+pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Input, InputError> {
+    let (at, spec) = (&entry.at, entry.spec);
     let columns = spec.columns.as_ref();
     let units = spec.units.as_ref();
     let force_column = columns.and_then(|c| c.force.as_ref());
     let force = match (force_column, &spec.force) {
         (None, None) => None,
-        (None, Some(force)) => Some(Waveform::Shape(shape(file, &key, force)?)),
+        (None, Some(force)) => Some(Waveform::Shape(shape(at, force)?)),
         (Some(column), force) => {
             if let Some(named) = force.as_ref().and_then(|f| f.shape) {
-                return Err(file
-                    .error_at(&format!("{key}.force.shape"), "the force is given twice")
+                return Err(at
+                    .error_in("force.shape", "the force is given twice")
                     .found(format!("a column and the shape `{named}`"))
                     .expected("one of the two"));
             }
             let interpolation = force.as_ref().and_then(|f| f.interpolation);
             let wanted = ColumnRequest {
-                experiment: i,
+                entry,
                 name: "force",
                 kind: Quantity::Force,
                 column,
@@ -120,23 +39,15 @@ pub fn read(
                 beside: None,
             };
             let meant = interpolation.unwrap_or_default();
-            Some(Waveform::Samples(signal(
-                file, spec, &wanted, meant, notes,
-            )?))
+            Some(Waveform::Samples(signal(&wanted, meant, notes)?))
         }
     };
-    let base = base(file, i, spec, notes)?;
-    let input = Input { force, base };
-    Ok(RawExcitation { input })
+    let base = base(entry, notes)?;
+    Ok(Input { force, base })
 }
 
-fn base(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    notes: &mut RecordNotes,
-) -> Result<Option<BaseMotion>, InputError> {
-    let key = format!("experiments[{i}]");
+fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>, InputError> {
+    let (at, spec) = (&entry.at, entry.spec);
     let columns = spec.columns.as_ref();
     let units = spec.units.as_ref();
     let acceleration = columns.and_then(|c| c.base_acceleration.as_ref());
@@ -145,14 +56,14 @@ fn base(
     let (column, kind) = match (acceleration, displacement) {
         (None, None) if spec.base.is_none() => return Ok(None),
         (None, None) => {
-            return Err(file
-                .error_at(&format!("{key}.base"), "the base motion is missing")
+            return Err(at
+                .error_in("base", "the base motion is missing")
                 .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`"));
         }
         (Some(_), Some(_)) => {
-            return Err(file
-                .error_at(
-                    &format!("{key}.columns.base_displacement"),
+            return Err(at
+                .error_in(
+                    "columns.base_displacement",
                     "the base motion is given twice",
                 )
                 .found("`base_acceleration` and `base_displacement`")
@@ -162,7 +73,7 @@ fn base(
         (None, Some(column)) => (column, Quantity::Displacement),
     };
     let wanted = |name, unit, kind| ColumnRequest {
-        experiment: i,
+        entry,
         name,
         kind,
         column,
@@ -173,17 +84,16 @@ fn base(
         let unit = units.and_then(|u| u.base_acceleration.as_ref());
         let wanted = wanted("base_acceleration", unit, kind);
         let meant = interpolation.unwrap_or_default();
-        return signal(file, spec, &wanted, meant, notes)
-            .map(|signal| Some(BaseMotion::Acceleration(signal)));
+        return signal(&wanted, meant, notes).map(|signal| Some(BaseMotion::Acceleration(signal)));
     }
     if let Some(given) = interpolation.filter(|i| *i != Interpolation::Cubic) {
         let name = match given {
             Interpolation::Hold => "`hold`",
             _ => "`linear`",
         };
-        return Err(file
-            .error_at(
-                &format!("{key}.base.interpolation"),
+        return Err(at
+            .error_in(
+                "base.interpolation",
                 "a displacement of the base is differentiated twice, so it must be smooth",
             )
             .found(name)
@@ -191,7 +101,7 @@ fn base(
     }
     let unit = units.and_then(|u| u.base_displacement.as_ref());
     let wanted = wanted("base_displacement", unit, kind);
-    let signal = signal(file, spec, &wanted, Interpolation::Cubic, notes)?;
+    let signal = signal(&wanted, Interpolation::Cubic, notes)?;
     Ok(Some(BaseMotion::Displacement(signal)))
 }
 
@@ -207,17 +117,11 @@ pub(in crate::config) fn known_stretches(values: &[f64]) -> Vec<Range<usize>> {
     stretches
 }
 
-fn gaps(
-    file: &ModelFile,
-    key: &str,
-    source: &ColumnSamples,
-    known: &[Range<usize>],
-    zero: f64,
-) -> InputError {
+fn gaps(at: &Place<'_>, source: &ColumnSamples, known: &[Range<usize>], zero: f64) -> InputError {
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
     let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
-    let error = file
-        .error_at(key, "the input has gaps")
+    let error = at
+        .error("the input has gaps")
         .found(format!(
             "{missing} of {} values missing, the first at {} s",
             source.values.len(),
@@ -236,21 +140,27 @@ fn gaps(
 
 /// A column as a signal. Refuses missing samples in the window, because an excitation acts at all times.
 fn signal(
-    file: &ModelFile,
-    spec: &ExperimentSpec,
     wanted: &ColumnRequest,
     interpolation: Interpolation,
     notes: &mut RecordNotes,
 ) -> Result<Signal, InputError> {
     // Interpolation needs samples of the excitation slightly beyond the window of the response.
+    let (entry, spec) = (wanted.entry, wanted.entry.spec);
     let unbounded = ExperimentSpec {
         window: None,
         ..spec.clone()
     };
-    let mut source = column_samples::read(file, &unbounded, wanted, notes)?;
-    let key = format!("experiments[{}].columns.{}", wanted.experiment, wanted.name);
-    let [from, to] =
-        column_samples::window(file, &format!("experiments[{}]", wanted.experiment), spec)?;
+    let everywhere = Entry {
+        spec: &unbounded,
+        ..entry.clone()
+    };
+    let everywhere = ColumnRequest {
+        entry: &everywhere,
+        ..*wanted
+    };
+    let mut source = column_samples::read(&everywhere, notes)?;
+    let at = entry.at.below(&format!("columns.{}", wanted.name));
+    let [from, to] = column_samples::window(entry)?;
     let known = known_stretches(&source.values);
     let last = source.times.len() - 1;
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
@@ -267,12 +177,10 @@ fn signal(
             source.values.truncate(run.end);
             source.values.drain(..run.start);
         }
-        None => return Err(gaps(file, &key, &source, &known, zero)),
+        None => return Err(gaps(&at, &source, &known, zero)),
     }
     let column = Column {
-        file,
-        experiment: wanted.experiment,
-        spec,
+        entry,
         name: &wanted.name.replace('_', " "),
         is_input: true,
         is_robust: false,
@@ -280,34 +188,27 @@ fn signal(
     let quantisation = quantisation_step(&source.values);
     column.check(&mut source, quantisation, notes);
     if let Some(step) = quantisation.filter(|step| is_coarse(*step, &source.values)) {
-        let fact = DataFact::Quantisation {
-            channel: column.name.to_owned(),
-            step: step / source.unit.factor(),
-            unit: source.unit.symbol().to_owned(),
-            share: step / (12.0f64.sqrt() * standard_deviation(&source.values)),
-            action: DataAction::Used,
-        };
-        notes.state(&file.experiment_name(wanted.experiment), &fact);
+        column.state_quantisation(step, &source.values, source.unit, USED, notes);
     }
     let samples = source.times.len();
     Signal::new(source.times, source.values, interpolation).ok_or_else(|| {
-        file.error_at(&key, "invalid samples of the input")
+        at.error("invalid samples of the input")
             .found(format!("{samples} samples"))
             .expected("finite values at increasing times")
     })
 }
 
 /// A force given by its shape instead of samples.
-pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
-    let key = format!("{key}.force");
+pub fn shape(at: &Place<'_>, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
+    let at = at.below("force");
     let Some(shape) = spec.shape else {
-        return Err(file
-            .error_at(&key, "the force is missing")
+        return Err(at
+            .error("the force is missing")
             .expected("`columns: {force: …}`, or `shape` here"));
     };
-    shape_keys(file, &key, shape, spec)?;
+    shape_keys(&at, shape, spec)?;
     let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
-    let (amplitude, at) = (number(spec.amplitude), number(spec.at));
+    let (amplitude, start) = (number(spec.amplitude), number(spec.at));
     let duration = number(spec.duration);
     Ok(match shape {
         ForceShape::Constant => ExcitationShape::Constant { amplitude },
@@ -320,26 +221,24 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Excitation
             amplitude,
             from: number(spec.from),
             to: number(spec.to),
-            start: at,
+            start,
             duration,
             law: SweepLaw::Linear,
         },
-        ForceShape::Step => ExcitationShape::Step { amplitude, at },
+        ForceShape::Step => ExcitationShape::Step {
+            amplitude,
+            at: start,
+        },
         ForceShape::HalfSine => ExcitationShape::HalfSine {
             amplitude,
-            at,
+            at: start,
             duration,
         },
     })
 }
 
 /// Refuses unknown and missing keys of a shape, and invalid values.
-fn shape_keys(
-    file: &ModelFile,
-    key: &str,
-    shape: ForceShape,
-    spec: &ForceSpec,
-) -> Result<(), InputError> {
+fn shape_keys(at: &Place<'_>, shape: ForceShape, spec: &ForceSpec) -> Result<(), InputError> {
     let keys = [
         ("amplitude", spec.amplitude),
         ("frequency", spec.frequency),
@@ -360,22 +259,22 @@ fn shape_keys(
     for (name, value) in keys {
         let is_needed = needed.contains(&name);
         if value.is_some() && !is_needed && !possible.contains(&name) {
-            let at = format!("{key}.{name}");
             let problem = format!("a {shape} has no `{name}`");
-            return Err((file.error_at(&at, problem))
+            return Err((at.error_in(name, problem))
                 .found(format!("`{name}`"))
                 .expected(expected()));
         }
         if value.is_none() && is_needed {
             let problem = format!("a {shape} needs its `{name}`");
-            return Err(file.error_at(key, problem).expected(expected()));
+            return Err(at.error(problem).expected(expected()));
         }
     }
     if spec.interpolation.is_some() {
-        let at = format!("{key}.interpolation");
-        return Err((file.error_at(&at, "a shape is not interpolated"))
-            .found(format!("`interpolation` beside `{shape}`"))
-            .expected("one of the two"));
+        return Err(
+            (at.error_in("interpolation", "a shape is not interpolated"))
+                .found(format!("`interpolation` beside `{shape}`"))
+                .expected("one of the two"),
+        );
     }
     let positive = [
         ("frequency", spec.frequency, "Hz"),
@@ -383,9 +282,8 @@ fn shape_keys(
     ];
     for (name, value, unit) in positive {
         if let Some(value) = value.filter(|v| v.0 <= 0.0) {
-            let at = format!("{key}.{name}");
-            return Err(file
-                .error_at(&at, format!("the {name} must be positive"))
+            return Err(at
+                .error_in(name, format!("the {name} must be positive"))
                 .found(format!("{} {unit}", value.0))
                 .expected(format!("a number greater than 0, in {unit}")));
         }

@@ -1,13 +1,20 @@
 //! Faults of the samples of a column, found before the fit: gaps, dropouts, spikes, saturation and quantisation.
 
+use super::Entry;
 use super::column_samples::{ColumnSamples, PresentRows};
-use super::data_facts::{DataAction, DataFact, GapPlace, MOST_PLACES, RecordNotes};
-use super::warning::DataWarning;
-use crate::config::ModelFile;
-use crate::config::spec::{ExperimentSpec, FaultName};
+use super::data_facts::{
+    Action, EXCLUDED, GapPlace, INTERPOLATED, MISSING, MOST_PLACES, RecordNotes, USED, fact,
+    gaps_in_words, spans_in_words, time, times_in_words,
+};
+use crate::config::spec::FaultName;
+use crate::finding::Finding;
+use crate::number_format::{count as counted, significant};
+use crate::units::Unit;
+use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::{available_for, both};
+use serde_json::json;
 
 /// Spacing, in median spacings, above which samples are missing.
 const GAP: f64 = 1.5;
@@ -20,21 +27,13 @@ const SUSTAINED: f64 = 0.05;
 
 /// A column with its place in the model.
 pub struct Column<'a> {
-    pub file: &'a ModelFile,
-    pub experiment: usize,
-    pub spec: &'a ExperimentSpec,
+    pub entry: &'a Entry<'a>,
     /// Name of the channel in sentences.
     pub name: &'a str,
     /// True for a force or a motion of the base.
     pub is_input: bool,
     /// True if spikes are treated by a robust loss.
     pub is_robust: bool,
-}
-
-/// Samples of a fault, by their indices.
-struct Faulty {
-    fault: FaultName,
-    samples: Vec<usize>,
 }
 
 impl Column<'_> {
@@ -54,25 +53,17 @@ impl Column<'_> {
         self.gaps(&times, notes);
         let step = step.unwrap_or(0.0);
         let (mut excluded, mut emptied) = (Vec::new(), Vec::new());
-        for Faulty { fault, samples } in self.faulty(&times, &values, step) {
+        for (fault, samples) in self.faulty(&times, &values, step) {
             let excludes = self.excludes(fault);
-            let action = if excludes {
-                DataAction::Excluded
-            } else {
-                DataAction::Used
-            };
-            let first = samples.first().copied().unwrap_or_default();
-            let level = values[first] / source.unit.factor();
-            let unit = source.unit.symbol().to_owned();
-            let fact = self.fact(fault, &samples, &times, action, level, unit);
-            notes.state(&self.experiment_name(), &fact);
+            let action = if excludes { EXCLUDED } else { USED };
+            let level = values[samples[0]];
+            let [fact, warning] = self.found(fault, &samples, &times, action, level, source.unit);
+            notes.state(&self.entry.name(), fact);
             if excludes {
                 emptied.extend(samples.iter().map(|i| rows.row(*i)));
                 excluded.push((samples.len(), fault.reason().to_owned()));
-            } else {
-                let is_robust = self.is_robust && fault == FaultName::Spikes;
-                let warning = (!is_robust).then(|| self.warning(&fact)).flatten();
-                notes.warnings.extend(warning.map(|w| self.placed(&w)));
+            } else if !(self.is_robust && fault == FaultName::Spikes) {
+                notes.warnings.push(self.entry.placed(warning));
             }
         }
         for row in emptied {
@@ -81,24 +72,35 @@ impl Column<'_> {
         excluded
     }
 
-    fn experiment_name(&self) -> String {
-        self.file.experiment_name(self.experiment)
-    }
-
-    fn placed(&self, warning: &DataWarning) -> crate::finding::Finding {
-        let (i, name) = (self.experiment, self.experiment_name());
-        let finding = warning.at(&format!("experiments[{i}] ({name})"));
-        finding.with("experiment", name)
+    /// States the quantisation step of the samples, SI, and what was done about its error.
+    pub fn state_quantisation(
+        &self,
+        step: f64,
+        values: &[f64],
+        unit: Unit,
+        action: Action,
+        notes: &mut RecordNotes,
+    ) {
+        let share = step / (12.0f64.sqrt() * standard_deviation(values));
+        let (channel, step, unit) = (self.name, step / unit.factor(), unit.symbol());
+        let text = format!(
+            "{channel} quantised in steps of {} {unit}",
+            significant(step, 3)
+        );
+        // The share is the standard deviation of the error, step/sqrt(12), relative to that of the samples.
+        let found = json!({"channel": channel, "step": step, "unit": unit, "share": share});
+        let fact = fact("quantisation", &text, action, found);
+        notes.state(&self.entry.name(), fact);
     }
 
     fn excludes(&self, fault: FaultName) -> bool {
-        let given = self.spec.exclude.as_ref();
+        let given = self.entry.spec.exclude.as_ref();
         !self.is_input && given.is_some_and(|list| list.values().contains(&fault))
     }
 
     /// Time on the axis of the file, s.
     fn in_file(&self, times: &[f64], i: usize) -> f64 {
-        let zero = self.spec.time_zero.map_or(0.0, |t| t.0);
+        let zero = self.entry.spec.time_zero.map_or(0.0, |t| t.0);
         let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
         round_time(times[i] + zero, spacing)
     }
@@ -128,29 +130,36 @@ impl Column<'_> {
             .iter()
             .copied()
             .max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
-        let action = match self.is_input {
-            true => DataAction::Interpolated,
-            false => DataAction::Missing,
-        };
-        let fact = DataFact::Gaps {
-            channel: self.name.to_owned(),
-            count: all.len(),
-            places,
-            action,
-        };
-        notes.state(&self.experiment_name(), &fact);
-        if let (true, Some(longest)) = (self.is_input, longest) {
-            let warning = DataWarning::InputGaps {
-                channel: self.name.to_owned(),
-                count: all.len(),
-                longest: [longest.from, longest.to],
-            };
-            notes.warnings.push(self.placed(&warning));
+        let (channel, gaps) = (self.name, counted(all.len(), "gap"));
+        let text = format!(
+            "{gaps} in the {channel}, {}",
+            gaps_in_words(&places, all.len())
+        );
+        let action = if self.is_input { INTERPOLATED } else { MISSING };
+        let found = json!({"channel": channel, "count": all.len(), "places": places});
+        let fact = fact("gaps", &text, action, found);
+        notes.state(&self.entry.name(), fact);
+        if let (true, Some(GapPlace { from, to, .. })) = (self.is_input, longest) {
+            let text = format!(
+                "the {channel} has {}, across which it is interpolated, the longest from {} to {} s; keep a part without them by \
+                 `window`",
+                gaps.replace("1 gap", "a gap"),
+                time(from),
+                time(to)
+            );
+            let found = json!({"channel": channel, "count": all.len(), "longest": [from, to]});
+            let warning = Finding::having("input_gaps", text, found);
+            notes.warnings.push(self.entry.placed(warning));
         }
     }
 
     /// The faulty samples of each kind.
-    fn faulty(&self, times: &[f64], values: &[f64], step: f64) -> Vec<Faulty> {
+    fn faulty(
+        &self,
+        times: &[f64],
+        values: &[f64],
+        step: f64,
+    ) -> impl Iterator<Item = (FaultName, Vec<usize>)> {
         let levels = || (dropouts(values, step), cut_off(values, step));
         let ((mut rows, mut limits), mut single) = match available_for(values.len()) {
             1 => (levels(), spikes(times, values)),
@@ -175,91 +184,82 @@ impl Column<'_> {
             (FaultName::Spikes, single),
             (FaultName::Saturation, cut),
         ];
-        let all = all.into_iter().filter(|(_, samples)| !samples.is_empty());
-        all.map(|(fault, samples)| Faulty { fault, samples })
-            .collect()
+        let all = all.into_iter();
+        all.filter(|(_, samples)| !samples.is_empty())
     }
 
-    fn fact(
+    /// The fact about faulty samples, and the warning where they are used; `level` is the value of the first one, SI.
+    fn found(
         &self,
         fault: FaultName,
         samples: &[usize],
         times: &[f64],
-        action: DataAction,
+        action: Action,
         level: f64,
-        unit: String,
-    ) -> DataFact {
-        let (channel, count) = (self.name.to_owned(), samples.len());
-        match fault {
-            FaultName::Dropouts => DataFact::Dropouts {
-                channel,
-                count,
-                places: samples
-                    .chunk_by(|a, b| a + 1 == *b)
-                    .take(MOST_PLACES)
-                    .map(|row| [row[0], row[row.len() - 1]].map(|i| self.in_file(times, i)))
-                    .collect(),
-                action,
-            },
-            FaultName::Spikes => DataFact::Spikes {
-                channel,
-                count,
-                places: (samples.iter().take(MOST_PLACES))
-                    .map(|i| self.in_file(times, *i))
-                    .collect(),
-                action,
-            },
-            FaultName::Saturation => DataFact::Saturation {
-                channel,
-                count,
-                level,
-                unit,
-                action,
-            },
-        }
-    }
-
-    /// The warning about samples that are used.
-    fn warning(&self, fact: &DataFact) -> Option<DataWarning> {
-        let is_input = self.is_input;
-        match fact {
-            DataFact::Saturation {
-                channel,
-                count,
-                level,
-                unit,
-                ..
-            } => Some(DataWarning::Saturation {
-                channel: channel.clone(),
-                samples: *count,
-                level: *level,
-                unit: unit.clone(),
-                is_input,
-            }),
-            DataFact::Dropouts {
-                channel,
-                count,
-                places,
-                ..
-            } => Some(DataWarning::Dropouts {
-                channel: channel.clone(),
-                samples: *count,
-                first: places.first().copied()?,
-                is_input,
-            }),
-            DataFact::Spikes {
-                channel,
-                count,
-                places,
-                ..
-            } => Some(DataWarning::Spikes {
-                channel: channel.clone(),
-                samples: *count,
-                first: places.first().copied()?,
-                is_input,
-            }),
-            _ => None,
-        }
+        unit: Unit,
+    ) -> [Finding; 2] {
+        let (channel, kind, count) = (self.name, fault.name(), samples.len());
+        let at = |i: &usize| self.in_file(times, *i);
+        let of_samples = counted(count, "sample");
+        let way_out = match (self.is_input, fault) {
+            (true, FaultName::Spikes) => {
+                "correct the file, or keep a part without spikes by `window`".to_owned()
+            }
+            (true, _) => "keep a part without them by `window`".to_owned(),
+            (false, FaultName::Spikes) => "leave spikes out: `exclude: [spikes]`".to_owned(),
+            (false, _) => format!("leave them out: `exclude: [{kind}]`"),
+        };
+        let (text, found, warning, of_warning) = match fault {
+            FaultName::Dropouts => {
+                let rows = samples.chunk_by(|a, b| a + 1 == *b).take(MOST_PLACES);
+                let places = rows.map(|row| [row[0], row[row.len() - 1]].map(|i| at(&i)));
+                let places: Vec<[f64; 2]> = places.collect();
+                let [from, to] = places[0];
+                (
+                    format!(
+                        "{of_samples} of the {channel} held at a constant value, {}",
+                        spans_in_words(&places)
+                    ),
+                    json!({"places": places}),
+                    format!(
+                        "{count} samples of the {channel} are held at a constant value, from {} to {} s at first, as by a dropout; {way_out}",
+                        time(from),
+                        time(to)
+                    ),
+                    json!({"first": [from, to]}),
+                )
+            }
+            FaultName::Spikes => {
+                let places: Vec<f64> = samples.iter().take(MOST_PLACES).map(at).collect();
+                let (spikes, all) = (counted(count, "spike"), times_in_words(&places, count));
+                (
+                    format!("{spikes} in the {channel}, at {all} s"),
+                    json!({"places": places}),
+                    format!(
+                        "{of_samples} of the {channel} {} far from the neighbours, the first at {} s; {way_out}",
+                        if count == 1 { "is" } else { "are" },
+                        time(places[0])
+                    ),
+                    json!({"first": places[0]}),
+                )
+            }
+            FaultName::Saturation => {
+                let (level, unit) = (level / unit.factor(), unit.symbol());
+                let value = format!("{} {unit}", significant(level, 4));
+                let found = json!({"level": level, "unit": unit});
+                (
+                    format!("{of_samples} of the {channel} at its extreme value {value}"),
+                    found.clone(),
+                    format!(
+                        "{count} samples of the {channel} equal its extreme value {value}; if the sensor saturates there, {way_out}"
+                    ),
+                    found,
+                )
+            }
+        };
+        let fact = fact(kind, &text, action, found).with("count", count);
+        let warning = Finding::having(kind, warning, of_warning).with("samples", count);
+        [fact, warning].map(|finding| finding.with("channel", channel))
     }
 }
 

@@ -9,11 +9,11 @@ mod excitation;
 mod faults;
 mod shared_samples;
 mod unit;
-mod warning;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
+use crate::config::build::Place;
 use crate::config::spec::{
     EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
     SensorSpec,
@@ -26,33 +26,57 @@ pub(super) use channel::RawChannel;
 pub(in crate::config) use channel::sensor_of;
 pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
-use excitation::RawExcitation;
 pub(in crate::config) use excitation::known_stretches;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
-use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind};
+use kmcfit_core::internals::record::{
+    BaseMotion, ChannelKind, Experiment, Input, InputErrorKind, Waveform,
+};
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
+use std::sync::Arc;
 
 pub(super) use excitation::shape;
-pub(crate) use warning::DataWarning;
+pub(super) use unit::UNIT_ASSUMED;
 
 /// Data of one experiment before it is placed on the grid, at the times of its samples.
 #[derive(Debug, Clone)]
 pub(super) struct RawRecord {
     pub channels: Vec<RawChannel>,
-    excitation: RawExcitation,
+    input: Input,
 }
 
 impl RawRecord {
     /// Samples of the force, if it alone acts.
     pub fn force(&self) -> Option<&Signal> {
-        self.excitation.force()
+        match &self.input {
+            Input {
+                force: Some(Waveform::Samples(signal)),
+                base: None,
+            } => Some(signal),
+            _ => None,
+        }
+    }
+
+    /// The measured input and its name, if it is one series of samples.
+    fn input_samples(&self) -> Option<(&'static str, &Signal)> {
+        match (&self.input.force, &self.input.base) {
+            (Some(Waveform::Samples(signal)), None) => Some(("force", signal)),
+            (None, Some(BaseMotion::Acceleration(signal))) => Some(("base_acceleration", signal)),
+            (None, Some(BaseMotion::Displacement(signal))) => Some(("base_displacement", signal)),
+            _ => None,
+        }
+    }
+
+    /// Forces (N) at some times (s), if measured and if no other input acts.
+    fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
+        self.force()?;
+        self.input.forces_at(times)
     }
 
     /// True for a free response.
     pub fn is_free(&self) -> bool {
-        self.excitation.is_empty()
+        self.input.force.is_none() && self.input.base.is_none()
     }
 
     /// First time of its rows, missing samples included, s.
@@ -69,12 +93,27 @@ impl RawRecord {
 
     /// True for a force and a motion of the base.
     fn has_two_inputs(&self) -> bool {
-        self.excitation.has_two_inputs()
+        self.input.force.is_some() && self.input.base.is_some()
     }
 
     /// Sampling interval of force or base motion, if equally spaced, s.
     pub fn drive_spacing(&self) -> Option<f64> {
-        self.excitation.spacing()
+        let force = match &self.input.force {
+            Some(Waveform::Samples(signal)) => Some(signal),
+            _ => None,
+        };
+        let base = match &self.input.base {
+            Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) => {
+                Some(signal)
+            }
+            None => None,
+        };
+        let times = force.or(base)?.times();
+        let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1).max(1) as f64;
+        let regular = times
+            .windows(2)
+            .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
+        (regular && spacing > 0.0).then_some(spacing)
     }
 
     /// The smallest median spacing of its channels, s.
@@ -108,6 +147,41 @@ pub struct HoldOut {
     pub notes: Vec<ChannelNote>,
 }
 
+/// One entry of `experiments`.
+#[derive(Debug, Clone)]
+pub(super) struct Entry<'a> {
+    pub at: Place<'a>,
+    pub number: usize,
+    pub spec: &'a ExperimentSpec,
+}
+
+impl<'a> Entry<'a> {
+    pub fn new(file: &'a ModelFile, number: usize) -> Self {
+        Self {
+            at: Place::new(file, format!("experiments[{number}]")),
+            number,
+            spec: &file.spec.experiments[number],
+        }
+    }
+
+    /// All entries of a model file.
+    pub fn all(file: &'a ModelFile) -> impl Iterator<Item = Self> {
+        (0..file.spec.experiments.len()).map(|i| Self::new(file, i))
+    }
+
+    /// Name of the experiment in reports.
+    pub fn name(&self) -> String {
+        self.at.file.experiment_name(self.number)
+    }
+
+    /// A finding about the experiment.
+    fn placed(&self, finding: Finding) -> Finding {
+        let name = self.name();
+        let place = format!("{} ({name})", self.at.key);
+        finding.at(&place).with("experiment", name)
+    }
+}
+
 /// True if the fit minimises the equation error instead of the misfit of a simulated response.
 fn is_equation_error(file: &ModelFile) -> bool {
     let method = file.spec.fit.as_ref().and_then(|f| f.method);
@@ -137,48 +211,39 @@ pub(super) fn read(
         let has_duration = (file.spec.grid.as_ref()).is_some_and(|g| g.duration.is_some());
         let all_have_data = specs.iter().all(|e| e.data.is_some());
         if has_duration || !all_have_data {
-            let records = specs.iter().enumerate().map(|(i, spec)| {
-                let excitation = excitation::read(file, i, spec, notes)?;
-                let channels = Vec::new();
-                Ok((!excitation.is_empty()).then_some(RawRecord {
-                    channels,
-                    excitation,
-                }))
+            let records = Entry::all(file).map(|entry| {
+                let record = RawRecord {
+                    channels: Vec::new(),
+                    input: excitation::read(&entry, notes)?,
+                };
+                Ok((!record.is_free()).then_some(record))
             });
             return records.collect();
         }
     }
-    let records = specs.iter().enumerate();
-    let records: Result<Vec<Option<RawRecord>>, InputError> = records
-        .map(|(i, spec)| read_one(file, i, spec, notes).map(Some))
-        .collect();
-    let records = records?;
+    let records = Entry::all(file).map(|entry| read_one(&entry, notes).map(Some));
+    let records: Vec<Option<RawRecord>> = records.collect::<Result<_, _>>()?;
     let repeated = shared_samples::repeated_records(file, &records);
     notes.warnings.extend(repeated);
     Ok(records)
 }
 
-fn read_one(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    notes: &mut RecordNotes,
-) -> Result<RawRecord, InputError> {
-    shared_samples::refuse_one_column_twice(file, i, spec)?;
-    let channels = channel::read(file, i, spec, notes)?;
+fn read_one(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<RawRecord, InputError> {
+    shared_samples::refuse_one_column_twice(entry)?;
+    let channels = channel::read(entry, notes)?;
     let mut record = RawRecord {
         channels,
-        excitation: excitation::read(file, i, spec, notes)?,
+        input: excitation::read(entry, notes)?,
     };
-    shared_samples::refuse_input_as_response(file, i, &record)?;
+    shared_samples::refuse_input_as_response(entry, &record)?;
     if let Some(channel) = record.channels.first() {
-        record.excitation.share_times(&channel.times);
+        record.input.share_times(&channel.times);
     }
-    let next = file.spec.experiments.get(i + 1);
-    if next.is_none_or(|next| next.data != spec.data) {
+    let next = entry.at.file.spec.experiments.get(entry.number + 1);
+    if next.is_none_or(|next| next.data != entry.spec.data) {
         notes.close_file();
     }
-    let checks = data_checks::of(file, i, spec, &record);
+    let checks = data_checks::of(entry, &record);
     // Outliers are spikes as well.
     notes.warnings.retain(|spikes| {
         let is_of = |w: &Finding, key: &str| w.quantities.get(key) == spikes.quantities.get(key);
@@ -186,34 +251,33 @@ fn read_one(
         spikes.kind != "spikes" || !outliers.any(|w| is_of(w, "experiment") && is_of(w, "channel"))
     });
     notes.warnings.extend(checks);
-    delays::apply(file, i, &mut record, notes)?;
+    delays::apply(entry, &mut record, notes)?;
     Ok(record)
 }
 
-/// The specification of experiment `i` with its data, and the notes on its channels.
+/// The specification of an experiment with its data, and the notes on its channels.
 pub(super) fn specification(
-    file: &ModelFile,
+    entry: &Entry<'_>,
     grid: &Grid,
-    i: usize,
     record: Option<RawRecord>,
     defaults: functions::Defaults<'_>,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
-    let spec = &file.spec.experiments[i];
+    let spec = entry.spec;
     let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
     let initial = match &spec.initial {
         InitialSpec::Scalar(Estimate) => [&estimate, &estimate],
         InitialSpec::Map(state) => [&state.displacement, &state.velocity],
     };
-    let mut found = builder::Record::new(file.experiment_name(i)).initial(initial.map(scalar));
+    let mut found = builder::Record::new(entry.name()).initial(initial.map(scalar));
     if is_held_out(spec) {
         found = found.validation();
     }
-    for given in functions::own(file, i) {
-        let key = format!("experiments[{i}].functions.{}", given.0.name());
-        let own = functions::specification(file, grid, &key, given, defaults)?;
+    for given in functions::own(spec) {
+        let at = entry.at.below(&format!("functions.{}", given.0.name()));
+        let own = functions::specification(&at, grid, given, defaults)?;
         found = found.coefficient(given.0, own);
     }
-    if let Some((quantity, error)) = input_sigma(file, i)? {
+    if let Some((quantity, error)) = input_sigma(entry)? {
         let kind = match error.kind {
             InputErrorName::Sensor => InputErrorKind::Sensor,
             InputErrorName::Drive => InputErrorKind::Drive,
@@ -222,32 +286,31 @@ pub(super) fn specification(
     }
     let mut notes = Vec::new();
     if let Some(record) = record {
-        if let Some(delay) = delays::of_input(file, i, record.spacing())?.parameter() {
+        if let Some(delay) = delays::of_input(entry, record.spacing())?.parameter() {
             found = found.input_delay(delay);
         }
-        found = found.input(record.excitation.into_input());
+        found = found.input(record.input);
         for raw in record.channels {
             notes.push(raw.note());
-            let delay = delays::of_channel(file, i, raw.kind, raw.median_spacing)?;
+            let delay = delays::of_channel(entry, raw.kind, raw.median_spacing)?;
             found = found.channel(channel(spec, raw, delay.parameter()));
         }
     }
     Ok((found, notes))
 }
 
-/// Stated errors of the input of experiment `i`, at most of one.
-fn input_sigma(
-    file: &ModelFile,
-    i: usize,
-) -> Result<Option<(InputQuantity, &InputSigmaSpec)>, InputError> {
-    let Some(sigma) = &file.spec.experiments[i].sigma else {
+/// Stated errors of the input of an experiment, at most of one.
+fn input_sigma<'a>(
+    entry: &Entry<'a>,
+) -> Result<Option<(InputQuantity, &'a InputSigmaSpec)>, InputError> {
+    let Some(sigma) = &entry.spec.sigma else {
         return Ok(None);
     };
     match (&sigma.force, &sigma.base_acceleration) {
         (Some(_), Some(_)) => {
-            let key = format!("experiments[{i}].sigma.base_acceleration");
-            Err(file
-                .error_at(&key, "errors are supported for one input")
+            let at = entry.at.below("sigma.base_acceleration");
+            Err(at
+                .error("errors are supported for one input")
                 .found("`force` and `base_acceleration`")
                 .expected("one of the two"))
         }
@@ -302,9 +365,9 @@ pub(super) fn delay_limits(
     records: &[Option<RawRecord>],
 ) -> Result<Vec<DelayLimits>, InputError> {
     let mut found = Vec::new();
-    for (i, record) in records.iter().enumerate() {
+    for (entry, record) in Entry::all(file).zip(records) {
         if let Some(record) = record {
-            found.extend(delays::limits(file, i, record)?);
+            found.extend(delays::limits(&entry, record)?);
         }
     }
     Ok(found)

@@ -1,9 +1,8 @@
 //! Samples that stand where others are meant: one column as an input and as a response, and a record that is listed twice.
 
-use super::warning::DataWarning;
-use super::{RawChannel, RawRecord};
+use super::{Entry, RawChannel, RawRecord};
 use crate::config::ModelFile;
-use crate::config::spec::{ColumnRef, ExperimentSpec};
+use crate::config::spec::ColumnRef;
 use crate::error::InputError;
 use crate::finding::Finding;
 
@@ -11,12 +10,8 @@ use crate::finding::Finding;
 ///
 /// # Errors
 /// At the second place.
-pub fn refuse_one_column_twice(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-) -> Result<(), InputError> {
-    let Some(columns) = &spec.columns else {
+pub fn refuse_one_column_twice(entry: &Entry<'_>) -> Result<(), InputError> {
+    let Some(columns) = &entry.spec.columns else {
         return Ok(());
     };
     let named: Vec<(&str, &ColumnRef)> = [
@@ -33,7 +28,7 @@ pub fn refuse_one_column_twice(
     for (place, (name, column)) in named.iter().enumerate() {
         let earlier = named[..place].iter().find(|(_, other)| other == column);
         if let Some((other, _)) = earlier {
-            return Err(refused(file, i, [other, name]));
+            return Err(refused(entry, [other, name]));
         }
     }
     Ok(())
@@ -48,12 +43,8 @@ const ROUNDING: f64 = 1e-6;
 ///
 /// # Errors
 /// At the response.
-pub fn refuse_input_as_response(
-    file: &ModelFile,
-    i: usize,
-    record: &RawRecord,
-) -> Result<(), InputError> {
-    let Some((name, signal)) = record.excitation.samples() else {
+pub fn refuse_input_as_response(entry: &Entry<'_>, record: &RawRecord) -> Result<(), InputError> {
+    let Some((name, signal)) = record.input_samples() else {
         return Ok(());
     };
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -67,19 +58,15 @@ pub fn refuse_input_as_response(
         values.len() == signal.values().len() && FACTORS.iter().any(same)
     };
     match record.channels.iter().find(is_input) {
-        Some(channel) => Err(refused(file, i, [name, channel.kind.name()])),
+        Some(channel) => Err(refused(entry, [name, channel.kind.name()])),
         None => Ok(()),
     }
 }
 
-fn refused(file: &ModelFile, i: usize, [one, other]: [&str; 2]) -> InputError {
-    let key = format!("experiments[{i}].columns.{other}");
+fn refused(entry: &Entry<'_>, [one, other]: [&str; 2]) -> InputError {
     let words = [one, other].map(|name| name.replace('_', " "));
-    file.error_at(
-        &key,
-        format!("{} and {} are the same column", words[0], words[1]),
-    )
-    .expected("a column for each of them")
+    let problem = format!("{} and {} are the same column", words[0], words[1]);
+    (entry.at.error_in(&format!("columns.{other}"), problem)).expected("a column for each of them")
 }
 
 /// Warnings about records with the samples of an earlier one, under whatever name.
@@ -94,10 +81,11 @@ pub fn repeated_records(file: &ModelFile, records: &[Option<RawRecord>]) -> Vec<
         };
         if let Some(earlier) = (0..later).find(repeats) {
             let [name, other] = [later, earlier].map(|i| file.experiment_name(i));
-            let warning = DataWarning::RepeatedRecord {
-                experiment: name.clone(),
-                other,
-            };
+            let text = format!(
+                "{name} has the samples of {other}: listed twice, they narrow the intervals without further information; remove one"
+            );
+            let warning = Finding::new("repeated_record", text).with("experiment", &name);
+            let warning = warning.with("other", other);
             warnings.push(warning.at(&format!("experiments[{later}] ({name})")));
         }
     }

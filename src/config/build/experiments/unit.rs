@@ -1,18 +1,20 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
-use super::warning::DataWarning;
-use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
 use crate::units::{Quantity, ScaledUnit, Unit};
+use serde_json::json;
+
+/// Kind of the statement of a unit that neither the model nor the file states; it stands beside a result, and is no warning.
+pub const UNIT_ASSUMED: &str = "unit_assumed";
 
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
-    pub file: &'a ModelFile,
-    /// The experiment's key.
-    pub experiment: &'a str,
+    /// The experiment.
+    pub at: &'a Place<'a>,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     pub kind: Quantity,
@@ -34,15 +36,36 @@ impl QuantityColumn<'_> {
         }
         let unapplied = self.table.unapplied(self.index);
         if !unapplied.is_empty() {
-            let warning = DataWarning::ScaleNotApplied {
-                column: self.table.label(self.index),
-                stated: unapplied.join(", "),
-                quantity: self.name.to_owned(),
-                unit: Unit::si(self.kind).symbol().to_owned(),
-            };
-            warnings.push(warning.at(&format!("{}.columns.{}", self.experiment, self.name)));
+            let (column, stated) = (self.table.label(self.index), unapplied.join(", "));
+            let (quantity, si) = (self.name, Unit::si(self.kind));
+            let unit = si.symbol();
+            let text = format!(
+                "the file states {stated} for the column `{column}`, which is not applied: state what one unit of its numbers is, as in \
+                 `units: {{{quantity}: 0.1 {unit}}}`"
+            );
+            let found =
+                json!({"column": column, "stated": stated, "quantity": quantity, "unit": unit});
+            warnings
+                .push(Finding::having("scale_not_applied", text, found).at(&self.key("columns")));
         }
         self.stated_unit(warnings).map(ScaledUnit::from)
+    }
+
+    /// The key of the column in a map of the experiment.
+    fn key(&self, map: &str) -> String {
+        format!("{}.{map}.{}", self.at.key, self.name)
+    }
+
+    /// A warning that the unit `used` is taken from one place, and that another one states another unit.
+    fn differs(&self, kind: &str, [from, other]: [&str; 2], [used, stated]: [&Unit; 2]) -> Finding {
+        let column = self.table.label(self.index);
+        let (used, stated) = (used.symbol(), stated.symbol());
+        let text = format!("column `{column}`: unit taken from {from} ({used}); {other} {stated}");
+        Finding::having(
+            kind,
+            text,
+            json!({"column": column, "used": used, "stated": stated}),
+        )
     }
 
     fn given_unit(
@@ -50,20 +73,15 @@ impl QuantityColumn<'_> {
         text: &Text,
         warnings: &mut Vec<Finding>,
     ) -> Result<ScaledUnit, InputError> {
-        let Self { name, kind, .. } = *self;
-        let units_key = format!("{}.units.{name}", self.experiment);
-        let stated = self.table.stated_unit(self.index);
-        let other = stated.explicit(kind).or(stated.suffix(kind));
-        let scaled = ScaledUnit::parse(kind, &text.0, other)
-            .map_err(|error| self.file.error_about(&units_key, error))?;
+        let units_key = self.key("units");
+        let other = self.stated();
+        let scaled = ScaledUnit::parse(self.kind, &text.0, other)
+            .map_err(|error| self.at.file.error_about(&units_key, error))?;
         let unit = scaled.unit;
         let differs = |other: &Unit| !other.is_arbitrary() && other.factor() != unit.factor();
         if let Some(other) = other.filter(differs) {
-            let warning = DataWarning::UnitDiffersFromFile {
-                column: self.table.label(self.index),
-                used: unit.symbol().into(),
-                stated: other.symbol().into(),
-            };
+            let places = ["the model", "the file says"];
+            let warning = self.differs("unit_differs_from_file", places, [&unit, &other]);
             warnings.push(warning.at(&units_key));
         }
         Ok(scaled)
@@ -73,8 +91,8 @@ impl QuantityColumn<'_> {
     fn stated_unit(&self, warnings: &mut Vec<Finding>) -> Result<Unit, InputError> {
         let Self { name, kind, .. } = *self;
         let stated = self.table.stated_unit(self.index);
-        let columns_key = format!("{}.columns.{name}", self.experiment);
-        let label = self.table.label(self.index);
+        let columns_key = self.key("columns");
+        let column = self.table.label(self.index);
         let (si, suffix) = (
             Unit::si(kind),
             stated.suffix(kind).or(stated.last_word(kind)),
@@ -86,66 +104,68 @@ impl QuantityColumn<'_> {
         })?;
         let found = stated.explicit(kind).or(suffix);
         if let Some(volts) = found.filter(Unit::is_arbitrary) {
-            let warning = DataWarning::Volts {
-                column: label,
-                quantity: name.to_owned(),
-                unit: volts.symbol().into(),
-            };
-            warnings.push(warning.at(&columns_key));
+            let unit = volts.symbol();
+            let text = format!(
+                "the {} in the column `{column}` is in {unit}: state the sensitivity of its sensor, as in `units: {{{name}: \
+                 10 V/(m/s²)}}`",
+                name.replace('_', " ")
+            );
+            let found = json!({"column": column, "quantity": name, "unit": unit});
+            warnings.push(Finding::having("volts", text, found).at(&columns_key));
             return Ok(volts);
         }
         if let Some(unit) = stated.explicit(kind) {
             if let Some(other) = suffix.filter(|other| differs(other, unit)) {
-                let warning = DataWarning::UnitDiffersFromName {
-                    column: label,
-                    used: unit.symbol().into(),
-                    stated: other.symbol().into(),
-                };
+                let places = ["the file's row of units", "its name ends in"];
+                let warning = self.differs("unit_differs_from_name", places, [&unit, &other]);
                 warnings.push(warning.at(&columns_key));
             }
             return Ok(unit);
         }
-        if let Some(text) = stated.text() {
-            let warning = DataWarning::UnknownUnit {
-                column: label,
-                stated: text.to_string(),
-                quantity: kind.name(),
-                used: si.symbol().into(),
-            };
-            warnings.push(warning.at(&columns_key));
-            return Ok(si);
-        }
-        let warning = match suffix {
+        let used = si.symbol();
+        let (warning, text, found) = match (stated.text(), suffix) {
+            (Some(stated), _) => (
+                "unknown_unit",
+                format!(
+                    "the unit `{stated}` of the {} in the column `{column}` is not known: {used} is assumed; state one under `units`",
+                    kind.name()
+                ),
+                json!({"column": column, "stated": stated, "quantity": kind.name(), "used": used}),
+            ),
             // A name like `phi_rad` has the symbol of the unit for reports.
-            Some(unit) if !differs(&unit, si) => return Ok(unit),
-            Some(unit) => DataWarning::UnitOfNameUnused {
-                column: label,
-                name: name.to_owned(),
-                used: si.symbol().into(),
-                stated: unit.symbol().into(),
-            },
-            None => DataWarning::UnitAssumed {
-                column: label,
-                quantity: name.to_owned(),
-                unit: si.symbol().into(),
-            },
+            (None, Some(unit)) if !differs(&unit, si) => return Ok(unit),
+            (None, Some(unit)) => {
+                let stated = unit.symbol();
+                let text = format!(
+                    "column `{column}`: {used} is assumed, although its name ends in {stated}; add `units: {{{name}: {stated}}}` if it is \
+                     in {stated}"
+                );
+                let found = json!({"column": column, "name": name, "used": used, "stated": stated});
+                ("unit_of_name_unused", text, found)
+            }
+            (None, None) => (
+                UNIT_ASSUMED,
+                format!("{} in {used} (column `{column}`)", name.replace('_', " ")),
+                json!({"column": column, "quantity": name, "unit": used}),
+            ),
         };
-        warnings.push(warning.at(&columns_key));
+        warnings.push(Finding::having(warning, text, found).at(&columns_key));
         Ok(si)
     }
 
     /// Warns if the table states another unit for this column of standard deviations than `used`, the unit of the
     /// samples that they belong to.
     pub fn same_as(&self, used: Unit, key: &str, warnings: &mut Vec<Finding>) {
-        let stated = self.table.stated_unit(self.index);
-        let own = stated.explicit(self.kind).or(stated.suffix(self.kind));
-        if let Some(own) = own.filter(|own| own.factor() != used.factor()) {
-            let warning = DataWarning::SigmaUnitDiffers {
-                column: self.table.label(self.index),
-                used: used.symbol().into(),
-                stated: own.symbol().into(),
-            };
+        if let Some(own) = self.stated().filter(|own| own.factor() != used.factor()) {
+            let places = ["the samples", "the file says"];
+            let warning = self.differs("sigma_unit_differs", places, [&used, &own]);
             warnings.push(warning.at(key));
         }
+    }
+
+    /// The unit that the table states by its row of units or the end of the name.
+    fn stated(&self) -> Option<Unit> {
+        let stated = self.table.stated_unit(self.index);
+        stated.explicit(self.kind).or(stated.suffix(self.kind))
     }
 }

@@ -4,19 +4,19 @@ mod noise;
 mod sampling;
 
 use super::column_samples::{self, ColumnRequest, ColumnSamples, PresentRows};
-use super::data_facts::{DataFact, RecordNotes};
+use super::data_facts::RecordNotes;
 use super::faults::{Column, is_coarse, quantisation_step};
 use super::{ChannelNote, names};
-use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
+use crate::config::build::Place;
+use crate::config::build::experiments::Entry;
 use crate::config::spec::{
     ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
 };
 use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
-use crate::number_format::significant;
-use crate::units::{Quantity, Unit};
-use kmcfit_core::internals::diagnostics::standard_deviation;
+use crate::number_format::{count, significant};
+use crate::units::Unit;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
@@ -62,11 +62,6 @@ pub struct RawChannel {
 }
 
 impl RawChannel {
-    /// True for a quadratic loss.
-    pub fn is_squared(&self) -> bool {
-        self.loss == Loss::Squares
-    }
-
     /// Notes for reports.
     pub fn note(&self) -> ChannelNote {
         ChannelNote {
@@ -110,32 +105,19 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
     }
 }
 
-/// The measured quantity of a channel.
-pub fn quantity(kind: ChannelKind) -> Quantity {
-    match kind {
-        ChannelKind::Displacement => Quantity::Displacement,
-        ChannelKind::Velocity => Quantity::Velocity,
-        ChannelKind::Acceleration => Quantity::Acceleration,
-    }
-}
-
 /// Settings of the sensor of a channel in the model file.
 pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
     spec_of(spec, kind).sensor
 }
 
-/// Reads all channels of experiment `i`.
-pub fn read(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    notes: &mut RecordNotes,
-) -> Result<Vec<RawChannel>, InputError> {
+/// Reads all channels of an experiment.
+pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Vec<RawChannel>, InputError> {
+    let spec = entry.spec;
     let named: Vec<ChannelKind> = (ChannelKind::ALL.into_iter())
         .filter(|kind| spec_of(spec, *kind).column.is_some())
         .collect();
     if named.is_empty() && (spec.data.is_none() || named_something_else(spec)) {
-        return Err(no_channel(file, i, spec));
+        return Err(no_channel(entry));
     }
     let default: ColumnRef = ScalarOr::Scalar(ColumnId::Name(DISPLACEMENT_COLUMN.to_owned()));
     let mut channels = Vec::new();
@@ -143,8 +125,8 @@ pub fn read(
         let of_kind = spec_of(spec, kind);
         let usual = named.is_empty() && kind == ChannelKind::Displacement;
         match of_kind.column.or(usual.then_some(&default)) {
-            Some(column) => channels.push(read_one(file, i, spec, &of_kind, column, notes)?),
-            None => without_column(file, i, &of_kind, &named)?,
+            Some(column) => channels.push(read_one(entry, &of_kind, column, notes)?),
+            None => without_column(entry, &of_kind, &named)?,
         }
     }
     Ok(channels)
@@ -158,26 +140,21 @@ fn named_something_else(spec: &ExperimentSpec) -> bool {
     })
 }
 
-fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
-    let key = format!("experiments[{i}]");
-    match (&spec.data, &spec.columns) {
-        (None, None) => file
-            .error_at(&key, "this experiment has no data")
+fn no_channel(entry: &Entry<'_>) -> InputError {
+    let at = &entry.at;
+    match (&entry.spec.data, &entry.spec.columns) {
+        (None, None) => at
+            .error("this experiment has no data")
             .expected("`data`, a CSV file with the samples"),
-        _ => file
-            .error_at(&format!("{key}.columns"), "this experiment has no data")
+        _ => at
+            .error_in("columns", "this experiment has no data")
             .found("no column of a response")
             .expected("one or more of `displacement`, `velocity`, `acceleration`"),
     }
 }
 
 /// Refuses a sigma, a loss, a noise model or a sensor of a channel without a column.
-fn without_column(
-    file: &ModelFile,
-    i: usize,
-    spec: &Spec,
-    named: &[ChannelKind],
-) -> Result<(), InputError> {
+fn without_column(entry: &Entry<'_>, spec: &Spec, named: &[ChannelKind]) -> Result<(), InputError> {
     let name = spec.kind.name();
     let given = [
         ("sigma", spec.sigma.is_some()),
@@ -187,9 +164,10 @@ fn without_column(
         ("sensors", spec.sensor.is_some()),
     ];
     match given.iter().find(|(_, given)| *given) {
-        Some((part, _)) => Err(file
-            .error_at(
-                &format!("experiments[{i}].{part}.{name}"),
+        Some((part, _)) => Err(entry
+            .at
+            .error_in(
+                &format!("{part}.{name}"),
                 format!("the {name} has no column, so it is not read"),
             )
             .found(match named {
@@ -202,31 +180,28 @@ fn without_column(
 }
 
 fn read_one(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
+    entry: &Entry<'_>,
     of_kind: &Spec,
     column: &ColumnRef,
     notes: &mut RecordNotes,
 ) -> Result<RawChannel, InputError> {
-    let kind = of_kind.kind;
-    let key = format!("experiments[{i}]");
-    let sigma_key = format!("{key}.sigma.{}", kind.name());
+    let (kind, spec, at) = (of_kind.kind, entry.spec, &entry.at);
+    let sigma_at = at.below(&format!("sigma.{}", kind.name()));
     let sigma_column = match of_kind.sigma {
-        Some(Sigma::Column(name)) => Some((name.as_str(), sigma_key.as_str())),
+        Some(Sigma::Column(name)) => Some((name.as_str(), &sigma_at)),
         _ => None,
     };
     let wanted = ColumnRequest {
-        experiment: i,
+        entry,
         name: kind.name(),
-        kind: quantity(kind),
+        kind: kind.into(),
         column,
         unit: of_kind.unit,
         beside: sigma_column,
     };
-    let mut source = column_samples::read(file, spec, &wanted, notes)?;
+    let mut source = column_samples::read(&wanted, notes)?;
     let mut ignored = Vec::new();
-    let loss = loss(file, &key, of_kind)?;
+    let loss = loss(at, of_kind)?;
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
     let quantisation = quantisation_step(&source.values);
     let is_stated = |step: &f64| {
@@ -234,9 +209,7 @@ fn read_one(
     };
     let step = quantisation.filter(is_stated);
     let column = Column {
-        file,
-        experiment: i,
-        spec,
+        entry,
         name: kind.name(),
         is_input: false,
         is_robust: loss != Loss::Squares,
@@ -246,13 +219,13 @@ fn read_one(
         ignored.push((source.outside, "outside the window".to_owned()));
     }
     if let Some(factor) = spec.decimate {
-        decimate(file, &key, factor.0, &mut source, &mut ignored)?;
+        decimate(at, factor.0, &mut source, &mut ignored)?;
     }
     let span = [source.times[0], source.times[source.times.len() - 1]];
     let present = PresentRows::of(&source.values);
     let samples = present.pick(&source.values);
-    let column = format!("{key}.columns.{}", kind.name());
-    refuse_too_little(file, &column, kind, &source, &samples)?;
+    let column_at = at.below(&format!("columns.{}", kind.name()));
+    refuse_too_little(&column_at, kind, &source, &samples)?;
     if missing > 0 {
         ignored.push((missing, "missing".to_owned()));
     }
@@ -262,18 +235,11 @@ fn read_one(
     let [times, values] = [&mut source.times, &mut source.values]
         .map(|column| present.picked(std::mem::take(column)));
     let spacing = even_spacing(&times);
-    let filter = band(file, &key, spec, spacing, missing)?;
-    let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
+    let filter = band(at, spec, spacing, missing)?;
+    let weighting = weighting(&sigma_at, of_kind.sigma, sigmas, &values)?;
     let (weighting, action) = with_quantisation(weighting, step.unwrap_or(0.0));
     if let Some(step) = step {
-        let fact = DataFact::Quantisation {
-            channel: kind.name().to_owned(),
-            step: step / source.unit.factor(),
-            unit: source.unit.symbol().to_owned(),
-            share: step / (12.0f64.sqrt() * standard_deviation(&values)),
-            action,
-        };
-        notes.state(&file.experiment_name(i), &fact);
+        column.state_quantisation(step, &values, source.unit, action, notes);
     }
     Ok(RawChannel {
         kind,
@@ -297,8 +263,7 @@ fn read_one(
 
 /// Refuses too few samples, and samples that are all equal; `samples` are those of `source` that are not missing.
 fn refuse_too_little(
-    file: &ModelFile,
-    column: &str,
+    at: &Place<'_>,
     kind: ChannelKind,
     source: &ColumnSamples,
     samples: &[f64],
@@ -306,20 +271,19 @@ fn refuse_too_little(
     let found = match samples {
         [] => {
             let (missing, label) = (source.values.len(), &source.label);
-            return Err(file
-                .error_at(column, "all samples are missing")
+            return Err(at
+                .error("all samples are missing")
                 .found(format!("{missing} rows without a number in `{label}`"))
                 .expected("at least one sample"));
         }
-        [_] => "1 sample".to_owned(),
-        few if few.len() < Grid::FEWEST_NODES => format!("{} samples", few.len()),
+        few if few.len() < Grid::FEWEST_NODES => count(few.len(), "sample"),
         [first, ..] => {
             if samples.iter().any(|sample| sample != first) {
                 return Ok(());
             }
             let unit = kind.unit_of(source.unit.is_angular());
-            return Err(file
-                .error_at(column, "all samples are equal")
+            return Err(at
+                .error("all samples are equal")
                 .found(format!(
                     "{} samples, all {} {unit}",
                     samples.len(),
@@ -328,8 +292,8 @@ fn refuse_too_little(
                 .expected("a record of a moving system"));
         }
     };
-    Err(file
-        .error_at(column, "too few samples")
+    Err(at
+        .error("too few samples")
         .found(found)
         .expected(format!("at least {}", Grid::FEWEST_NODES)))
 }

@@ -1,9 +1,9 @@
 //! Standard deviation of the samples, loss of the residuals, and correlation of the noise.
 
-use super::super::data_facts::DataAction;
+use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
-use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
+use crate::config::build::Place;
 use crate::config::spec::{CorrelationName, LossName};
 use crate::config::values::Sigma;
 use crate::error::InputError;
@@ -18,8 +18,7 @@ const STUDENT: f64 = 4.0;
 const FIRST_SIGMA: f64 = 0.05;
 
 pub(super) fn weighting(
-    file: &ModelFile,
-    key: &str,
+    at: &Place<'_>,
     sigma: Option<&Sigma>,
     sigmas: Option<Vec<f64>>,
     values: &[f64],
@@ -34,8 +33,8 @@ pub(super) fn weighting(
         }
         (Some(Sigma::Column(name)), Some(sigmas)) => {
             match sigmas.iter().position(|s| !s.is_finite() || *s <= 0.0) {
-                Some(row) => Err(file
-                    .error_at(key, "a standard deviation must be positive")
+                Some(row) => Err(at
+                    .error("a standard deviation must be positive")
                     .found(match sigmas[row].is_nan() {
                         true => format!("an empty field in `{name}` for sample {}", row + 1),
                         false => format!(
@@ -59,29 +58,26 @@ const NEGLIGIBLE: f64 = 0.1;
 pub(super) fn with_quantisation(
     weighting: Option<Weighting>,
     step: f64,
-) -> (Option<Weighting>, DataAction) {
+) -> (Option<Weighting>, Action) {
     let error = step / 12.0f64.sqrt();
     // An invalid sigma stays, for its message.
     let is_large = |sigma: &f64| *sigma > 0.0 && error > NEGLIGIBLE * sigma;
     match weighting {
-        Some(Weighting::Sigma(sigma)) if is_large(&sigma) => (
-            Some(Weighting::Sigma(sigma.hypot(error))),
-            DataAction::AddedToSigma,
-        ),
+        Some(Weighting::Sigma(sigma)) if is_large(&sigma) => {
+            let weighting = Weighting::Sigma(sigma.hypot(error));
+            (Some(weighting), ADDED_TO_SIGMA)
+        }
         Some(Weighting::Sigmas(sigmas)) if sigmas.iter().any(is_large) => {
             let sigmas = sigmas.iter().map(|sigma| sigma.hypot(error));
-            (
-                Some(Weighting::Sigmas(sigmas.collect())),
-                DataAction::AddedToSigma,
-            )
+            (Some(Weighting::Sigmas(sigmas.collect())), ADDED_TO_SIGMA)
         }
-        Some(Weighting::Estimated { .. }) => (weighting, DataAction::LeastSigma),
-        _ => (weighting, DataAction::Used),
+        Some(Weighting::Estimated { .. }) => (weighting, LEAST_SIGMA),
+        _ => (weighting, USED),
     }
 }
 
-pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, InputError> {
-    let key = format!("{key}.loss.{}", of_kind.kind.name());
+pub(super) fn loss(at: &Place<'_>, of_kind: &Spec) -> Result<Loss, InputError> {
+    let at = at.below(&format!("loss.{}", of_kind.kind.name()));
     let (name, threshold, degrees) = match of_kind.loss {
         None => return Ok(Loss::Squares),
         Some(ScalarOr::Scalar(name)) => (*name, None, None),
@@ -93,20 +89,14 @@ pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, 
     ] {
         match given {
             Some(_) if name != owner => {
-                return Err(file
-                    .error_at(
-                        &format!("{key}.{part}"),
-                        format!("`{name}` has no `{part}`"),
-                    )
+                return Err(at
+                    .error_in(part, format!("`{name}` has no `{part}`"))
                     .found(format!("`{part}`"))
                     .expected(format!("`{part}` for `{owner}` only")));
             }
             Some(number) if number.0 <= 0.0 => {
-                return Err(file
-                    .error_at(
-                        &format!("{key}.{part}"),
-                        format!("the `{part}` must be positive"),
-                    )
+                return Err(at
+                    .error_in(part, format!("the `{part}` must be positive"))
                     .found(number.0)
                     .expected(match part {
                         "threshold" => "a number greater than 0, in standard deviations",

@@ -1,9 +1,10 @@
 //! Sampling of a channel: equal spacing, decimation, and the band-pass filter.
 
 use super::super::column_samples;
-use crate::config::ModelFile;
+use crate::config::build::Place;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
+use crate::number_format::count;
 use kmcfit_core::internals::signal::even_spacing;
 use kmcfit_core::internals::signal::{self, SecondOrder};
 
@@ -12,23 +13,22 @@ const BAND_ORDER: usize = 2;
 
 /// Keeps every `factor`-th sample after a low-pass filter.
 pub(super) fn decimate(
-    file: &ModelFile,
-    key: &str,
+    at: &Place<'_>,
     factor: usize,
     source: &mut column_samples::ColumnSamples,
     ignored: &mut Vec<(usize, String)>,
 ) -> Result<(), InputError> {
-    let at = format!("{key}.decimate");
+    let at = at.below("decimate");
     if factor == 0 {
-        return Err(file
-            .error_at(&at, "the decimation factor must not be 0")
+        return Err(at
+            .error("the decimation factor must not be 0")
             .found(factor)
             .expected("an integer, 1 or more"));
     }
     let whole = source.values.iter().all(|v| !v.is_nan());
     if !whole || source.times.len() < 2 || even_spacing(&source.times).is_none() {
-        return Err(file
-            .error_at(&at, "decimation needs equally spaced samples without gaps")
+        return Err(at
+            .error("decimation needs equally spaced samples without gaps")
             .found(match whole {
                 true => "times that are not equally spaced",
                 false => "missing samples",
@@ -50,8 +50,7 @@ pub(super) fn decimate(
 
 /// The filter of the band.
 pub(super) fn band(
-    file: &ModelFile,
-    key: &str,
+    at: &Place<'_>,
     spec: &ExperimentSpec,
     spacing: Option<f64>,
     missing: usize,
@@ -59,14 +58,13 @@ pub(super) fn band(
     let Some(band) = &spec.band else {
         return Ok(Vec::new());
     };
-    let at = format!("{key}.band");
+    let at = at.below("band");
     let Some(spacing) = spacing else {
-        return Err(file
-            .error_at(&at, "filtering needs equally spaced samples without gaps")
+        return Err(at
+            .error("filtering needs equally spaced samples without gaps")
             .found(match missing {
                 0 => "times that are not equally spaced".to_owned(),
-                1 => "1 missing sample".to_owned(),
-                count => format!("{count} missing samples"),
+                some => count(some, "missing sample"),
             })
             .expected("no `band`, or a window without gaps"));
     };
@@ -80,7 +78,7 @@ pub(super) fn band(
     };
     sections.ok_or_else(|| {
         let end = |f: Option<f64>| f.map_or("open".to_owned(), |f| format!("{f} Hz"));
-        file.error_at(&at, "invalid frequency band")
+        at.error("invalid frequency band")
             .found(format!("{} to {}", end(low), end(high)))
             .expected(format!(
                 "`min`, `max` or both, with 0 < min < max < {} Hz, half the sampling rate",
