@@ -185,11 +185,6 @@ impl FitAssessment {
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             let is_white = !is_coloured && !assessment.plausibility.is_disturbed;
             let losses = interpolation_losses(problem, theta, evaluation, is_white);
-            if !losses.is_empty() {
-                // What interpolation takes of a force leaves residuals like those of a missing term.
-                let warnings = &mut assessment.plausibility.warnings;
-                warnings.retain(|warning| !matches!(warning, FitWarning::MissingTerm(_)));
-            }
             assessment.plausibility.warnings.extend(losses);
             let may_vary = may_vary(&assessment.plausibility);
             if may_vary {
