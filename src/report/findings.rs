@@ -276,8 +276,9 @@ pub fn warning(warning: &FitWarning) -> Finding {
             unit,
             errors,
             width,
+            better,
             ..
-        } => {
+        } if better <= width => {
             let errors = significant(*errors, 2);
             let shift = match shift {
                 Some(shift) => format!("{} {unit} ({errors} standard errors)", significant(*shift, 2)),
@@ -288,6 +289,11 @@ pub fn warning(warning: &FitWarning) -> Finding {
                 significant(*width, 3)
             )
         }
+        FitWarning::FrictionWidth { width, better, .. } => format!(
+            "the residuals ask for a larger width of Coulomb friction than {} m/s: about {} m/s",
+            significant(*width, 3),
+            significant(*better, 2)
+        ),
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }

@@ -388,9 +388,10 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
             experiment,
             channel,
         } => format!("the residuals of the {channel} of {experiment} have a mean"),
-        VerdictReason::FrictionWidth { estimate } => {
-            format!("the {estimate} depends on the width of Coulomb friction")
-        }
+        VerdictReason::FrictionWidth { estimate, is_small } => match is_small {
+            true => "a larger width of Coulomb friction fits better".to_owned(),
+            false => format!("the {estimate} depends on the width of Coulomb friction"),
+        },
         VerdictReason::SecondMode {
             frequencies: [first, second],
         } => format!(

@@ -1,6 +1,6 @@
 //! Records on which the program once misled: reasons, advice and analyses of what they say now.
 
-use crate::workbench::Workbench;
+use crate::workbench::{Workbench, repository};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -74,6 +74,132 @@ fn the_loss_by_lines_is_named_at_any_sampling_rate() {
             reasons.contains(&"interpolation_loss"),
             "{sigma:?}: {reasons:?}"
         );
+    }
+}
+
+/// A sweep through the natural frequency: at seven samples a period lines take a share of the force that looks like a cubic stiffness, and at
+/// 28 they hide none that is there.
+#[test]
+fn a_loss_by_lines_is_no_term_and_hides_none() {
+    for (every, cubic) in [(40, 0.0), (10, 3e7)] {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let force = |t: f64| 3.0 * (TAU * (20.0 + t) * t).sin();
+        let acceleration = |t: f64, y: f64, v: f64| {
+            (force(t) - 3.7385 * v - 41_107.0 * y - cubic * y.powi(3)) / 0.85
+        };
+        let (mut y, mut v, step) = (0.0, 0.0, 1e-4);
+        let mut text = String::from("time (s),force (N),displacement (mm)\n");
+        for i in 0..200_000 {
+            let t = step * f64::from(i);
+            if i % every == 0 {
+                let [f, y] = [(force(t), 0.1), (1e3 * y, 0.004)]
+                    .map(|(exact, sigma)| exact + noise(&mut random, sigma));
+                writeln!(text, "{t:.3},{f:.5},{y:.6}").expect("a text");
+            }
+            // The midpoint rule: its relative error of the frequency, (omega h)^2 / 6, is 8e-5.
+            let middle = (y + 0.5 * step * v, v + 0.5 * step * acceleration(t, y, v));
+            y += step * middle.1;
+            v += step * acceleration(t + 0.5 * step, middle.0, middle.1);
+        }
+        let bench = Workbench::empty();
+        bench.write("sweep.csv", &text);
+        bench.run_to(0, &["init", "sweep.csv"]);
+        let arguments = [
+            "sweep.yaml",
+            "--set",
+            "experiments.0.force.interpolation=linear",
+            "--set",
+            "experiments.0.sigma={displacement: 4e-6, force: {value: 0.1, kind: sensor}}",
+        ];
+        let document = fit(&bench, &arguments);
+        let reasons = kinds(&document["verdict"]["reasons"]);
+        let is_there = cubic > 0.0;
+        assert!(reasons.contains(&"interpolation_loss"), "{reasons:?}");
+        assert_eq!(reasons.contains(&"missing_term"), is_there, "{reasons:?}");
+        // What the table of the tests shows is no other answer.
+        let tests = &document["model_tests"];
+        let mut terms = tests["extensions"].as_array().expect("tests").iter();
+        let term = terms.find(|test| test["term"] == "cubic_stiffness");
+        let t = term.and_then(|test| test["t"].as_f64()).expect("a test");
+        let limit = tests["t_limit"].as_f64().expect("a limit");
+        assert_eq!(t.abs() >= limit, is_there, "{t}");
+    }
+}
+
+/// A steady response at 3 Hz of a system of 10 Hz, stated to begin at rest: what oscillates beside it at 10 Hz is the system, at 25 Hz another
+/// source.
+#[test]
+fn a_tone_of_the_system_has_no_other_cause() {
+    let (stiffness, damping) = (2.0 * (TAU * 10.0).powi(2), 0.8);
+    let drive = TAU * 3.0;
+    let (real, imaginary) = (stiffness - 2.0 * drive * drive, damping * drive);
+    for (tone, is_other) in [(10.0, false), (25.0, true)] {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut text = String::from("time (s),force (N),displacement (mm)\n");
+        for i in 0..1600 {
+            let t = 0.005 * f64::from(i);
+            let y = 10.0 / real.hypot(imaginary) * (drive * t - imaginary.atan2(real)).sin();
+            let decay = if is_other { 0.0 } else { damping / 4.0 };
+            let beside = 0.3 * (-decay * t).exp() * (TAU * tone * t).sin();
+            let y = 1e3 * y + beside + noise(&mut random, 0.002);
+            writeln!(text, "{t:.3},{:.6},{y:.6}", 10.0 * (drive * t).sin()).expect("a text");
+        }
+        let initial = match is_other {
+            true => "estimate",
+            false => "{displacement: 0.0, velocity: 0.0}",
+        };
+        let bench = Workbench::empty();
+        bench.write("record.csv", &text);
+        let parts = format!(
+            "mass: {{fixed: 2.0}}, damping: {{fixed: {damping}}}, stiffness: {{basis: constant, start: {stiffness}}}"
+        );
+        bench.write(
+            "model.yaml",
+            &format!(
+                "format: 1\nexperiments:\n  - {{data: record.csv, columns: {{time: 1, force: 2, displacement: 3}}, force: {{interpolation: cubic}}, sigma: {{displacement: estimate}}, initial: {initial}}}\nfunctions: {{{parts}}}\n"
+            ),
+        );
+        let document = fit(&bench, &["model.yaml"]);
+        let pattern = &document["experiments"][0]["channels"][0]["pattern"]["tone"];
+        let found = pattern["frequency"].as_f64().expect("a tone");
+        assert!((found / tone - 1.0).abs() < 0.05, "{found}");
+        let advice = kinds(&document["advice"]);
+        assert_eq!(advice.contains(&"restrict_band"), is_other, "{advice:?}");
+    }
+}
+
+/// The friction of the shipped record is smoothed over 0.01 m/s: that width is no doubt about the model, and from others the advice leads to it. The
+/// gain of a sensor beside free coefficients is the width by another name.
+#[test]
+fn the_width_of_friction_is_that_of_the_record() {
+    let model = repository("models/friction.yaml");
+    let model = model.to_str().expect("a path");
+    let bench = Workbench::empty();
+    for width in [0.01f64, 0.02, 0.0025, 0.000_625] {
+        let key = "functions.coulomb_friction.width=";
+        let document = fit(&bench, &[model, "--set", &format!("{key}{width}")]);
+        let reasons = kinds(&document["verdict"]["reasons"]);
+        let expected: &[&str] = if width == 0.01 {
+            &[]
+        } else {
+            &["friction_width"]
+        };
+        assert_eq!(reasons, expected, "{width}");
+        let advice = &document["advice"][0];
+        if width != 0.01 {
+            let tried = advice["tried"].as_str().expect("an outcome");
+            let set = advice["set"][0].as_str().expect("an override");
+            let to: f64 = set
+                .strip_prefix(key)
+                .expect("a width")
+                .parse()
+                .expect("a number");
+            let far = |width: f64| (width / 0.01).ln().abs();
+            assert!(
+                tried.starts_with("tried") && far(to) < far(width),
+                "{width}: {advice}"
+            );
+        }
     }
 }
 

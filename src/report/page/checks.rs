@@ -72,7 +72,8 @@ fn extensions(document: &ResultDocument, tests: &ModelTests) -> String {
     let rows: Vec<Vec<String>> = tests.extensions.iter().map(row).collect();
     let limit = significant(tests.t_limit, 2);
     paragraph(&format!(
-        "Missing terms and errors of the records, each added alone: estimate, and t = estimate / standard error. A candidate with |t| of {limit} \
+        "Missing terms and errors of the records, each added alone: estimate, and t = estimate / standard error, with \
+         cubic splines for lines between the samples of an input where these make it smaller. A candidate with |t| of {limit} \
          or more is fitted; it counts as missing if this fit explains the residuals."
     )) + &table(
         "Missing terms and errors of the records",

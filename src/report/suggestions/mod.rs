@@ -399,15 +399,29 @@ fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
     ))
 }
 
-/// A smaller width of Coulomb friction: the shift of the estimates is at most proportional to it.
+/// A better width of Coulomb friction: the shift of the estimates is at most proportional to it.
 fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
     let depends = document.fit_warning("friction_width")?;
-    let factor = (depends.number("errors")? / WIDTH_SHIFT).clamp(2.0, 16.0);
-    let width = written(depends.number("width")? / factor);
+    let number = |name: &str| depends.number(name);
+    let (width, better) = (number("width")?, number("better")?);
+    let least = width * WIDTH_SHIFT / number("errors")?;
+    let (kind, words, to) = match better > width {
+        true => (
+            "widen_friction",
+            "a larger width of Coulomb friction fits better",
+            better,
+        ),
+        false => (
+            "narrow_friction",
+            "the estimates depend on the width of Coulomb friction: reduce it",
+            better.max(least.min(0.5 * width)),
+        ),
+    };
+    let to = written(to);
     Some(Suggestion::change(
-        "narrow_friction",
-        "the estimates depend on the width of Coulomb friction: reduce it",
-        vec![format!("functions.coulomb_friction.width={width}")],
+        kind,
+        words,
+        vec![format!("functions.coulomb_friction.width={to}")],
     ))
 }
 

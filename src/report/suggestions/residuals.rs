@@ -16,9 +16,10 @@ const HARDLY: f64 = 50.0;
 /// The suggestion from the first pattern in the residuals of a channel, or from a sigma that is too small.
 pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
     // The equation error supports robust losses and bands, but estimates no sensor.
-    let is_possible = |pattern: &ResidualPattern| {
-        let is_of_sensor = matches!(pattern, ResidualPattern::Offset | ResidualPattern::Drift);
-        document.is_simulated() || !is_of_sensor
+    let is_possible = |pattern: &ResidualPattern| match pattern {
+        ResidualPattern::Offset | ResidualPattern::Drift => document.is_simulated(),
+        ResidualPattern::Tone { frequency, .. } => !is_of_system(document, *frequency),
+        ResidualPattern::Outliers { .. } => true,
     };
     let pattern = |c: &ChannelSummary| c.pattern.clone().filter(is_possible);
     let mut patterns = document
@@ -44,6 +45,15 @@ pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
             estimated.collect(),
         )
     })
+}
+
+/// True for a frequency within the half-power width of the system, to the resolution of the record: no other source is its cause.
+fn is_of_system(document: &ResultDocument, frequency: f64) -> bool {
+    let value = |name: &str| document.estimates.get(name).map(|estimate| estimate.value);
+    let (natural, ratio) = (value("natural_frequency"), value("damping_ratio"));
+    let resolution = 1.0 / document.model.duration;
+    let width = |natural: f64| ratio.map_or(0.0, |ratio| ratio.abs() * natural) + resolution;
+    natural.is_some_and(|natural| (frequency - natural).abs() <= width(natural))
 }
 
 fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPattern) -> Suggestion {

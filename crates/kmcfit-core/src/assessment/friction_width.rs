@@ -1,22 +1,35 @@
-//! Dependence of the estimates on the width of Coulomb friction.
+//! Dependence of the estimates on the width of Coulomb friction, and the width that the residuals prefer.
+//!
+//! The change of the predictions where the width `w` is halved is a further column beside the derivatives of the model. The residuals
+//! ask for `s` times this change: to first order they are least at the width `w (1 - s/2)`. A width with smaller residuals than its half is
+//! that of the system, and no artefact of the smoothing.
 
 use super::FitWarning;
+use super::score_tests::SIGNIFICANT;
+use super::span::Span;
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 
 /// Smallest shift of an estimate by half the width that is a warning, in standard errors.
 const NOTICEABLE: f64 = 0.5;
+/// Increase of the sum of squares by half the width, in units of the variance, from which the residuals prefer the whole: odds of 20 to 1
+/// (6 = 2 ln 20).
+const PREFERRED: f64 = 6.0;
+/// Largest ratio of a better width to the given one, and its inverse.
+const MOST: f64 = 16.0;
 
-/// Warning where half the width of Coulomb friction shifts an estimate other than friction by more than half a standard error; names
-/// that with the largest shift.
+/// Warning where half the width of Coulomb friction shifts an estimate other than friction by more than half a standard error and the
+/// residuals do not prefer the whole, or where they ask for a larger one; names the estimate with the largest shift.
 pub(super) fn width_warning(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
 ) -> Option<FitWarning> {
     let width = problem.system.friction_width()?;
-    let shifts = problem.shifts_by_width(theta, evaluation)?;
+    let changes = problem.changes_by_width(evaluation)?;
+    let better = better_width(problem, evaluation, &changes, width);
+    let shifts = problem.shifts_by(theta, evaluation, changes)?;
     let functions = &problem.functions;
     let function_of = |j: usize| {
         let mut all = functions.iter().zip(functions.ranges());
@@ -39,11 +52,42 @@ pub(super) fn width_warning(
             (scalar.name.clone(), Some(scalar.unit.clone()))
         }
     };
-    (in_errors[worst] > NOTICEABLE).then(|| FitWarning::FrictionWidth {
+    let better = better?;
+    (in_errors[worst] > NOTICEABLE || better > width).then(|| FitWarning::FrictionWidth {
         estimate,
         shift: unit.is_some().then_some(shifts[worst][0]),
         unit: unit.unwrap_or_default(),
         errors: in_errors[worst],
         width,
+        better,
     })
+}
+
+/// A width that the residuals prefer to `width`, or the smallest one that they do not exclude; `None` where they prefer `width` to its half.
+fn better_width(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    changes: &[Vec<f64>],
+    width: f64,
+) -> Option<f64> {
+    let pairs = problem.predicted(evaluation).zip(changes);
+    let columns = pairs.flat_map(|((channel, predicted), changes)| {
+        let changed: Vec<f64> = predicted.iter().zip(changes).map(|(p, c)| p + c).collect();
+        let [here, there] = [predicted, &changed].map(|p| channel.majorant(p).weighted);
+        there
+            .into_iter()
+            .zip(here)
+            .map(|(there, here)| there - here)
+    });
+    let at = |changes: f64| (width * (1.0 - 0.5 * changes)).clamp(width / MOST, MOST * width);
+    let Some((changes, t)) = Span::score(problem, evaluation, columns.collect()) else {
+        // The residuals say nothing.
+        return Some(width / MOST);
+    };
+    let error = changes / t;
+    match (1.0 - 2.0 * changes) / (error * error) {
+        _ if t < -SIGNIFICANT => Some(at(changes)),
+        increase if increase > PREFERRED => None,
+        _ => Some(at((changes + 2.0 * error).max(1.0))),
+    }
 }

@@ -44,6 +44,17 @@ pub(super) fn interpolation_losses(
     each.collect()
 }
 
+/// The evaluation with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.
+pub(super) fn evaluation_with_cubics(problem: &Problem, theta: &[f64]) -> Option<Evaluation> {
+    let mut other: Option<Problem> = None;
+    for e in 0..problem.experiments.len() {
+        if let Some(cubic) = with_cubics(problem, e) {
+            other = Some(with_input(other.as_ref().unwrap_or(problem), e, cubic)?);
+        }
+    }
+    other?.evaluate(theta).ok()
+}
+
 /// Factor by which lines pass a sine of so many cycles per sample.
 fn passed(cycles: f64) -> f64 {
     let sinc = (PI * cycles).sin() / (PI * cycles);

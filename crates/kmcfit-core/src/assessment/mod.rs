@@ -192,11 +192,6 @@ impl FitAssessment {
                 true => interpolation_losses(problem, theta, evaluation, is_white),
                 false => Vec::new(),
             };
-            if !losses.is_empty() {
-                // What interpolation takes of a force leaves residuals like those of a missing term.
-                let warnings = &mut assessment.plausibility.warnings;
-                warnings.retain(|warning| !matches!(warning, FitWarning::MissingTerm(_)));
-            }
             assessment.plausibility.warnings.extend(losses);
             let may_vary = may_vary(&assessment.plausibility);
             if may_vary {

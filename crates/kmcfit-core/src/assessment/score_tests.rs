@@ -14,6 +14,7 @@
 
 use super::FitWarning;
 use super::extension::extended;
+use super::interpolation_loss::evaluation_with_cubics;
 use super::model_tests::{Extension, ExtensionTest};
 use super::record_errors::small_error;
 use super::record_parameters::{self, RecordColumns, RecordParameter};
@@ -117,22 +118,20 @@ impl<'a> ScoreTests<'a> {
     }
 
     /// The tests, each with its estimate and `t`, in the order of the candidates. `is_modelled` is true for residuals that the noise model
-    /// describes.
-    fn results(&self, is_modelled: bool) -> Vec<(Candidate, f64, f64)> {
-        let column = |i: usize| match i.checked_sub(self.kinds.len()) {
-            None => Some(self.terms.column(i).into_owned()),
-            Some(i) => {
-                let (problem, evaluation) = (self.problem, self.evaluation);
-                let column = (self.of_records).column(problem, evaluation, self.records[i])?;
-                Some(DVector::from_vec(column))
-            }
-        };
-        let test = |i: usize| {
-            self.model
-                .test(self.problem, column(i)?, &self.rest, is_modelled)
-        };
-        let count = self.kinds.len() + self.records.len();
-        let tests = map(count, analyses_at_once(self.problem.sample_count()), test);
+    /// describes. Lines between the samples of an input take a share of it that looks like a term: a candidate that is less significant with
+    /// cubic splines in their place is tested with these.
+    fn results(&self, theta: &[f64], is_modelled: bool) -> Vec<(Candidate, f64, f64)> {
+        let mut tests = self.tested(&self.rest, is_modelled);
+        let size = |test: &Option<(f64, f64)>| test.map_or(0.0, |(_, t)| t.abs());
+        if tests.iter().any(|test| size(test) >= SIGNIFICANT)
+            && let Some(cubic) = evaluation_with_cubics(self.problem, theta)
+        {
+            let rest = weighted_residuals(self.problem, &cubic);
+            let rest = self.model.orthogonal(rest);
+            let pairs = tests.iter_mut().zip(self.tested(&rest, is_modelled));
+            let smaller = pairs.filter(|(test, cubic)| size(cubic) < size(test));
+            smaller.for_each(|(test, cubic)| *test = cubic);
+        }
         let terms = self.kinds.iter();
         let terms = terms.map(|(kind, term)| Candidate::Term(*kind, *term));
         let records = self.records.iter().copied().map(Candidate::Record);
@@ -142,6 +141,21 @@ impl<'a> ScoreTests<'a> {
             Some((candidate, value, t))
         });
         tests.collect()
+    }
+
+    /// Estimate and `t` of each candidate, given the part of the residuals orthogonal to the derivatives of the model.
+    fn tested(&self, rest: &DVector<f64>, is_modelled: bool) -> Vec<Option<(f64, f64)>> {
+        let column = |i: usize| match i.checked_sub(self.kinds.len()) {
+            None => Some(self.terms.column(i).into_owned()),
+            Some(i) => {
+                let (problem, evaluation) = (self.problem, self.evaluation);
+                let column = (self.of_records).column(problem, evaluation, self.records[i])?;
+                Some(DVector::from_vec(column))
+            }
+        };
+        let test = |i: usize| self.model.test(self.problem, column(i)?, rest, is_modelled);
+        let count = self.kinds.len() + self.records.len();
+        map(count, analyses_at_once(self.problem.sample_count()), test)
     }
 }
 
@@ -154,7 +168,7 @@ pub(super) fn missing(
     tests: Option<&ScoreTests<'_>>,
     is_modelled: bool,
 ) -> (Option<FitWarning>, Vec<ExtensionTest>) {
-    let tests = tests.map_or_else(Vec::new, |tests| tests.results(is_modelled));
+    let tests = tests.map_or_else(Vec::new, |tests| tests.results(theta, is_modelled));
     let results = tests.iter().map(|(candidate, value, t)| ExtensionTest {
         extension: candidate.extension(problem),
         value: *value,

@@ -83,6 +83,8 @@ pub enum VerdictReason {
     FrictionWidth {
         /// Name of the estimate with the largest shift.
         estimate: String,
+        /// True if a larger width leaves smaller residuals.
+        is_small: bool,
     },
     /// Two modes vibrate in a record.
     SecondMode {
@@ -403,8 +405,14 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
             experiment: experiment.clone(),
             channel: channel.clone(),
         },
-        FitWarning::FrictionWidth { estimate, .. } => VerdictReason::FrictionWidth {
+        FitWarning::FrictionWidth {
+            estimate,
+            width,
+            better,
+            ..
+        } => VerdictReason::FrictionWidth {
             estimate: estimate.clone(),
+            is_small: better > width,
         },
         FitWarning::Negative { function } => VerdictReason::Negative {
             function: function.clone(),

@@ -125,7 +125,8 @@ pub enum FitWarning {
         /// True if a static force has the same effect: the channel is a displacement, and no static force is estimated.
         or_static_force: bool,
     },
-    /// Half the width of Coulomb friction shifts an estimate by more than half a standard error.
+    /// Half the width of Coulomb friction shifts an estimate by more than half a standard error and leaves residuals as small, or a larger width
+    /// leaves smaller ones.
     FrictionWidth {
         /// Name of the estimate with the largest shift.
         estimate: String,
@@ -137,6 +138,8 @@ pub enum FitWarning {
         errors: f64,
         /// Width, m/s.
         width: f64,
+        /// A width that leaves smaller residuals, or the smallest one that leaves as small ones, m/s.
+        better: f64,
     },
     /// A function is negative at most times, which violates passivity.
     Negative {

@@ -16,19 +16,20 @@ impl Problem {
     /// Shift of each parameter where the width of Coulomb friction is halved, and its standard error. `None` without friction or
     /// parameters, with more than 64 parameters, and where half the step cannot be simulated.
     pub fn shifts_by_width(&self, theta: &[f64], evaluation: &Evaluation) -> Option<Vec<[f64; 2]>> {
-        self.shifts_by(theta, evaluation, differences(self, evaluation)?)
+        self.shifts_by(theta, evaluation, self.changes_by_width(evaluation)?)
     }
-}
 
-/// Change of the predictions of each channel where the width is halved.
-fn differences(problem: &Problem, evaluation: &Evaluation) -> Option<Vec<Vec<f64>>> {
-    let [wide, narrow] = [problem, &narrower(problem)?].map(|problem| changes(problem, evaluation));
-    let pairs = narrow?.into_iter().zip(wide?);
-    let differences = pairs.map(|(narrow, wide)| {
-        let pairs = narrow.iter().zip(&wide);
-        pairs.map(|(a, b)| a - b).collect()
-    });
-    Some(differences.collect())
+    /// Change of the predictions of each channel where the width is halved. `None` without friction, and where half the step cannot be
+    /// simulated.
+    pub(crate) fn changes_by_width(&self, evaluation: &Evaluation) -> Option<Vec<Vec<f64>>> {
+        let [wide, narrow] = [self, &narrower(self)?].map(|problem| changes(problem, evaluation));
+        let pairs = narrow?.into_iter().zip(wide?);
+        let differences = pairs.map(|(narrow, wide)| {
+            let pairs = narrow.iter().zip(&wide);
+            pairs.map(|(a, b)| a - b).collect()
+        });
+        Some(differences.collect())
+    }
 }
 
 /// The problem with half the width; `None` without friction.

@@ -12,7 +12,7 @@ use super::observer::Observer;
 use super::rounds::{is_ended, with_round};
 use super::settings::{FitSettings, StartStrategy};
 use super::start_strategy::PROBING_ITERATIONS;
-use super::starts::scan_start;
+use super::starts::{is_dominant, scan_start};
 use super::termination::Status;
 use super::timings::timed;
 use crate::functions::CoefficientKind;
@@ -73,11 +73,13 @@ struct FurtherStarts<'a, 'w> {
 }
 
 impl FurtherStarts<'_, '_> {
-    /// Searches from a scan of the natural frequency where the residuals are not noise.
+    /// Searches from a scan of the natural frequency where the residuals are not noise and the frequency may be wrong.
     fn scan(&mut self, start: &[f64]) -> Result<(), SimulationError> {
         let problem = self.problem;
         let nodes = problem.system.grid.nodes() * problem.experiments.len();
-        if nodes > MOST_NODES || is_noise(problem, &self.found) {
+        let is_found =
+            is_noise(problem, &self.found) || is_dominant(problem, &self.found.best.evaluation);
+        if nodes > MOST_NODES || is_found {
             return Ok(());
         }
         let clock = Instant::now();

@@ -8,7 +8,8 @@
 //! Masses and springs that are free are multiplied by one factor each for a frequency. The steps are taken in the logarithms of masses,
 //! dampings and stiffnesses, which stay positive without a bound.
 
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization, Ratios};
+use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::Experiment;
 use crate::signal::{Spectrum, median_spacing};
@@ -26,6 +27,9 @@ const LIMITS: [f64; 2] = [2.0, 2.5];
 /// Largest ratio of a natural frequency to the dominant one of a free response of constants: an octave, so that two modes, harmonics and
 /// friction leave it within.
 const NEAR: f64 = 2.0;
+/// Difference of the natural and the dominant frequency, in the spacing of the spectrum, below which they are one: the response then has the
+/// phase of the record throughout.
+const SHARE: f64 = 0.25;
 /// Steps from each frequency, and further ones from those kept.
 const SCAN_STEPS: [u64; 2] = [2, 4];
 /// Frequencies that are kept after the first steps.
@@ -215,6 +219,27 @@ fn descents(problem: &Problem, steps: u64, starts: Vec<Vec<f64>>) -> Vec<(Vec<f6
     points.filter(|(_, cost)| cost.is_finite()).collect()
 }
 
+/// Dominant frequencies of the channels of constants in free records, rad/s, with the spacing of their spectra; none of others.
+fn dominant(problem: &Problem) -> impl Iterator<Item = (f64, f64)> {
+    let is_free =
+        problem.functions.are_constants() && problem.experiments.iter().all(Experiment::is_free);
+    let channels = problem.channels().filter(move |c| is_free && c.len() > 1);
+    channels.filter_map(|c| {
+        let spectrum = Spectrum::of(c.observed(), median_spacing(c.times()))?;
+        Some((TAU * spectrum.dominant(), TAU * spectrum.resolution()))
+    })
+}
+
+/// True for constants in free records whose natural frequency is the dominant one of each channel: a scan finds the same.
+pub(in crate::solvers) fn is_dominant(problem: &Problem, evaluation: &Evaluation) -> bool {
+    let ratios = Ratios::of(&evaluation.nodal);
+    let Some(natural) = ratios.frequency.first().map(|f| TAU * f) else {
+        return false;
+    };
+    let mut all = dominant(problem).peekable();
+    all.peek().is_some() && all.all(|(omega, spacing)| (omega - natural).abs() < SHARE * spacing)
+}
+
 /// Natural frequencies of the scan, rad/s: equally spaced logarithms between [`LIMITS`]; of constants in free records those near the
 /// dominant frequency of a channel.
 fn frequencies(problem: &Problem) -> Option<Vec<f64>> {
@@ -229,16 +254,7 @@ fn frequencies(problem: &Problem) -> Option<Vec<f64>> {
     (low > 0.0 && high > low && high.is_finite()).then_some(())?;
     let share = |i: usize| i as f64 / (FREQUENCIES - 1) as f64;
     let all = (0..FREQUENCIES).map(|i| low * (high / low).powf(share(i)));
-    let dominant = channels().filter_map(|c| {
-        let spectrum = Spectrum::of(c.observed(), median_spacing(c.times()))?;
-        Some(TAU * spectrum.dominant())
-    });
-    let dominant: Vec<f64> = match problem.functions.are_constants()
-        && problem.experiments.iter().all(Experiment::is_free)
-    {
-        true => dominant.collect(),
-        false => Vec::new(),
-    };
+    let dominant: Vec<f64> = dominant(problem).map(|(omega, _)| omega).collect();
     let is_near = |omega: &f64| dominant.iter().any(|d| (omega / d).max(d / omega) <= NEAR);
     let near: Vec<f64> = all.clone().filter(is_near).collect();
     Some(if near.is_empty() { all.collect() } else { near })
@@ -339,24 +355,46 @@ mod tests {
     use super::*;
     use crate::builder::{BasisSpec, Builder, CoefficientSpec, Knots, Record, Start};
 
-    /// Free decay of 5 rad/s in 40 s: constants are scanned within an octave of it, a stiffness on knots over the whole range.
-    #[test]
-    fn constants_of_a_free_record_are_scanned_near_its_frequency() {
+    /// A problem of unit mass and free damping for a free decay of 5 rad/s in 40 s.
+    fn decay(stiffness: CoefficientSpec) -> Problem {
         let times: Vec<f64> = (0..801).map(|i| 0.05 * f64::from(i)).collect();
         let decay = |t: &f64| (-0.05 * t).exp() * (5.0 * t).cos();
         let samples: Vec<f64> = times.iter().map(decay).collect();
-        let scanned = |stiffness: CoefficientSpec| {
-            let parts = [1.0, 0.2].map(CoefficientSpec::constant);
-            let [mass, damping] = parts;
-            let record = Record::new("decay").displacement(&times, &samples);
-            let builder = Builder::new([mass, damping, stiffness]).record(record);
-            frequencies(&builder.build().expect("a problem")).expect("frequencies")
-        };
+        let [mass, damping] = [1.0, 0.2].map(CoefficientSpec::constant);
+        let record = Record::new("decay").displacement(&times, &samples);
+        let builder = Builder::new([mass, damping, stiffness]).record(record);
+        builder.build().expect("a problem")
+    }
+
+    fn on_three_knots() -> CoefficientSpec {
+        let basis = BasisSpec::PiecewiseLinear(Knots::Count(3));
+        CoefficientSpec::estimated(basis, Start::Constant(25.0))
+    }
+
+    /// Constants are scanned within an octave of the frequency of the record, a stiffness on knots over the whole range.
+    #[test]
+    fn constants_of_a_free_record_are_scanned_near_its_frequency() {
+        let scanned = |stiffness| frequencies(&decay(stiffness)).expect("frequencies");
         let near = scanned(CoefficientSpec::constant(10.0));
         assert!((5..=10).contains(&near.len()), "{near:?}");
         assert!(near[0] >= 2.4 && near[near.len() - 1] <= 10.2, "{near:?}");
-        let basis = BasisSpec::PiecewiseLinear(Knots::Count(3));
-        let varying = CoefficientSpec::estimated(basis, Start::Constant(10.0));
-        assert_eq!(scanned(varying).len(), FREQUENCIES);
+        assert_eq!(scanned(on_three_knots()).len(), FREQUENCIES);
+    }
+
+    /// The spectrum has a spacing of 0.157 rad/s, a quarter of which is 0.8 % of the frequency.
+    #[test]
+    fn constants_with_the_frequency_of_the_record_need_no_scan() {
+        let is_found = |stiffness| {
+            let problem = decay(stiffness);
+            is_dominant(
+                &problem,
+                &problem.evaluate(&problem.start()).expect("a response"),
+            )
+        };
+        for (omega, expected) in [(5.0, true), (5.02, true), (5.1, false), (4.9, false)] {
+            let stiffness = CoefficientSpec::constant(omega * omega);
+            assert_eq!(is_found(stiffness), expected, "{omega}");
+        }
+        assert!(!is_found(on_three_knots()));
     }
 }

@@ -6,7 +6,7 @@ mod growing_horizon;
 mod truncated;
 
 pub(super) use equation_error::equation_error_start;
-pub(super) use frequency_scan::scan_start;
+pub(super) use frequency_scan::{is_dominant, scan_start};
 pub(super) use growing_horizon::growing_horizon_start;
 pub(super) use truncated::{truncated_start, truncated_steps};
 
