@@ -193,6 +193,43 @@ fn errors_of_the_force_pass_into_accelerations_between_nodes() {
     assert!(hold, "{counts:?}");
 }
 
+/// Of a free mass an acceleration has the error of the force at its own time, over the mass, also with nodes between the samples.
+#[test]
+fn an_acceleration_has_the_error_of_the_force_at_its_time() {
+    let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
+    let (mass, sigma) = (2.0, 0.1);
+    let accelerations: Vec<f64> = force().iter().map(|f| f / mass).collect();
+    let mut channel = ChannelSpec::new(ChannelKind::Acceleration, &times, &accelerations);
+    channel.weighting = Some(Weighting::Sigma(0.01));
+    let record = Record::new("forced")
+        .from_state(0.0, 0.0)
+        .force(&times, &force())
+        .channel(channel)
+        .input_error(InputQuantity::Force, InputErrorKind::Drive, sigma);
+    let parts = [
+        CoefficientSpec::constant(mass),
+        CoefficientSpec::fixed(0.0),
+        CoefficientSpec::fixed(0.0),
+    ];
+    let problem = Builder::new(parts)
+        .record(record)
+        .nodes(4 * SAMPLES / 3)
+        .method(Method::Rk4)
+        .build()
+        .unwrap();
+    let settings = FitSettings::default();
+    let (problem, fit) =
+        fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
+    let mass = fit.best.parameters[0];
+    let correlation = problem.experiments[0].channels[0].correlation();
+    let effect = correlation.and_then(|c| c.input_errors());
+    let errors = white(1, 5);
+    let found = effect.expect("errors of the force").response(&errors);
+    for (found, error) in found.iter().zip(&errors) {
+        assert!((found - error / mass).abs() < 1e-12, "{found} {error}");
+    }
+}
+
 #[test]
 fn intervals_hold_with_errors_of_the_force() {
     let seeds = seeds(6, 20);

@@ -586,19 +586,19 @@ fn hysteresis_follows_its_closed_form() {
             let step = |i: usize| [0.0, 0.5, 1.0].map(|s| value(h * (i as f64 + s)));
             StageSamples::new((0..nodes - 1).map(step).collect::<Vec<_>>())
         };
-        // Forwards until t = 1, then backwards half of the way.
+        // Forwards until t = 1, then backwards a quarter of the way.
         let away = |t: f64| {
             if t < 1.0 {
                 t * t * (3.0 - 2.0 * t)
             } else {
-                1.0 - 0.5 * (t - 1.0).powi(2)
+                1.0 - 0.25 * (t - 1.0).powi(2)
             }
         };
         let speed = |t: f64| {
             if t < 1.0 {
                 6.0 * t * (1.0 - t)
             } else {
-                1.0 - t
+                0.5 * (1.0 - t)
             }
         };
         let excitation = Excitation {
