@@ -1,4 +1,4 @@
-//! Operations on a system: response, adjoint, tangents, and the linearisation of its steps. Explicit steps of up to three coordinates are
+//! Operations on a system: response, adjoint, tangents, and the linearisation of its steps. Explicit steps of one coordinate are
 //! compiled; all others go through the assembled structure.
 
 use super::adjoint::{Adjoint, Gradient};
@@ -9,7 +9,7 @@ use super::stage::{DUFFING, Drive, LINEAR, Model};
 use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{CoefficientGradient, Trajectory};
 use crate::simd;
-use crate::structure::{Law, Link, MOST_ELEMENTS, MOST_LINKS};
+use crate::structure::{Law, Link, MOST_ELEMENTS};
 use crate::system::{
     Excitation, FUNCTIONS, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
 };
@@ -51,31 +51,17 @@ pub struct Driven<'a> {
     pub excitation: Option<&'a Excitation>,
 }
 
-/// Calls a function of the kernel's model of a compiled [`Driven`] system with some links; the common lists of elements of one coordinate are
-/// known to the compiler.
+/// Calls a function of the kernel's model of a compiled [`Driven`] system with some links; the common lists of elements are known to the
+/// compiler.
 macro_rules! with_model {
     ($driven:expr, $links:expr, $call:ident($($argument:expr),*)) => {{
         let (driven, links): (Driven, &[Link]) = ($driven, $links);
-        match (driven.system.structure.coordinates(), driven.system.method) {
-            (2, Method::Midpoint) => $call(driven.model::<2, MOST_LINKS, _>(&MIDPOINT, links), $($argument),*),
-            (2, _) => $call(driven.model::<2, MOST_LINKS, _>(&RK4, links), $($argument),*),
-            (3, Method::Midpoint) => $call(driven.model::<3, MOST_LINKS, _>(&MIDPOINT, links), $($argument),*),
-            (3, _) => $call(driven.model::<3, MOST_LINKS, _>(&RK4, links), $($argument),*),
-            _ => with_one_model!(driven, links, $call($($argument),*)),
-        }
-    }};
-}
-
-/// [`with_model`] of one coordinate.
-macro_rules! with_one_model {
-    ($driven:expr, $links:expr, $call:ident($($argument:expr),*)) => {{
-        let (driven, links): (Driven, &[Link]) = ($driven, $links);
         match driven.system.method {
-            Method::Midpoint if links == LINEAR => $call(driven.model::<1, 2, _>(&MIDPOINT, links), $($argument),*),
-            Method::Midpoint => $call(driven.model::<1, MOST_ELEMENTS, _>(&MIDPOINT, links), $($argument),*),
-            _ if links == LINEAR => $call(driven.model::<1, 2, _>(&RK4, links), $($argument),*),
-            _ if links == DUFFING => $call(driven.model::<1, 3, _>(&RK4, links), $($argument),*),
-            _ => $call(driven.model::<1, MOST_ELEMENTS, _>(&RK4, links), $($argument),*),
+            Method::Midpoint if links == LINEAR => $call(driven.model::<2, _>(&MIDPOINT, links), $($argument),*),
+            Method::Midpoint => $call(driven.model::<MOST_ELEMENTS, _>(&MIDPOINT, links), $($argument),*),
+            _ if links == LINEAR => $call(driven.model::<2, _>(&RK4, links), $($argument),*),
+            _ if links == DUFFING => $call(driven.model::<3, _>(&RK4, links), $($argument),*),
+            _ => $call(driven.model::<MOST_ELEMENTS, _>(&RK4, links), $($argument),*),
         }
     }};
 }
@@ -95,7 +81,7 @@ fn respond_in<const E: usize, const S: usize>(
     trajectory: &mut Trajectory,
     order: Order,
 ) {
-    let x = components(initial);
+    let x = [[initial.displacement(0)], [initial.velocity(0)]];
     let states = trajectory.columns_mut();
     match order {
         Order::Paper => in_paper_order(model, x, states),
@@ -104,26 +90,9 @@ fn respond_in<const E: usize, const S: usize>(
     }
 }
 
-/// Response of a compiled structure of several coordinates. Matrices of linear steps would save a third of the time, and cost as much again to
-/// compile.
-fn respond_in_stages<const N: usize, const E: usize, const S: usize>(
-    model: Model<N, E, S>,
-    initial: &State,
-    trajectory: &mut Trajectory,
-) {
-    let x = components(initial);
-    let states = trajectory.columns_mut();
-    simd::run(Prepared { model, x, states });
-}
-
-fn components<const N: usize>(state: &State) -> [[f64; N]; 2] {
-    let all = state.components();
-    std::array::from_fn(|k| std::array::from_fn(|j| all[k * N + j]))
-}
-
-/// Adjoint of a compiled structure.
-fn adjoint_in<const N: usize, const E: usize, const S: usize>(
-    model: Model<N, E, S>,
+/// Adjoint of one coordinate.
+fn adjoint_in<const E: usize, const S: usize>(
+    model: Model<1, E, S>,
     trajectory: &Trajectory,
     source: &Trajectory,
     gradient: Gradient,
@@ -187,11 +156,11 @@ impl<'a> Driven<'a> {
         self
     }
 
-    fn model<'b, const N: usize, const E: usize, const S: usize>(
+    fn model<'b, const E: usize, const S: usize>(
         self,
         tableau: &'b Tableau<S>,
         list: &'b [Link],
-    ) -> Model<'b, N, E, S>
+    ) -> Model<'b, 1, E, S>
     where
         'a: 'b,
     {
@@ -203,27 +172,27 @@ impl<'a> Driven<'a> {
         Model {
             tableau,
             list,
-            masses: std::array::from_fn(|j| self.nodal.inertias[j].as_slice()),
+            masses: [&self.nodal.inertias[0]],
             coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
             drives: driven.map(|e| {
-                std::array::from_fn(|j| Drive {
-                    force: stages(e.force(j)),
-                    base: stages(e.frame(j)),
-                })
+                [Drive {
+                    force: stages(e.force(0)),
+                    base: stages(e.frame(0)),
+                }]
             }),
             dt: self.system.grid.step(),
         }
     }
 
-    /// The elements of a structure whose steps are compiled: explicit ones of few coordinates.
+    /// The elements of a structure whose steps are compiled: explicit ones of one coordinate.
     fn links(self) -> Option<&'a [Link]> {
         let links = self.system.structure.links();
         links.filter(|_| self.system.method != Method::ImplicitMidpoint)
     }
 
-    /// True where the linearised steps are not those of one coordinate that is compiled.
+    /// True where the steps are not compiled.
     pub(crate) fn is_assembled(self) -> bool {
-        self.links().is_none() || self.system.structure.coordinates() > 1
+        self.links().is_none()
     }
 
     /// Response from `initial` over the nodes of `trajectory`; a record may be shorter than the grid.
@@ -248,10 +217,7 @@ impl<'a> Driven<'a> {
             true => Order::Linear,
             false => Order::Nonlinear,
         };
-        match self.system.structure.coordinates() {
-            1 => with_one_model!(driven, links, respond_in(initial, trajectory, order)),
-            _ => with_model!(driven, links, respond_in_stages(initial, trajectory)),
-        }
+        with_model!(driven, links, respond_in(initial, trajectory, order));
         require_finite(grid, trajectory)
     }
 
@@ -301,7 +267,7 @@ impl<'a> Driven<'a> {
         let Some(links) = self.links() else {
             return self.linearise_assembled(trajectory, from, maps);
         };
-        with_one_model!(self, links, linearise_in(trajectory, from, wanted, maps));
+        with_model!(self, links, linearise_in(trajectory, from, wanted, maps));
     }
 
     /// Directional derivative of the response along `direction`; not a number where a step has no solution.

@@ -10,7 +10,7 @@
 //! | `trials` | the paper's trial steps, eight systems at once |
 //! | `paper` | Eq. 13 and 15-17, as the paper writes them |
 //! | `observation`, `nodal_observations` | displacement, velocity and acceleration at any time |
-//! | `engine` | these operations on a system of one coordinate |
+//! | `engine` | these operations on a system |
 //! | `assembled` | the same for structures of any size, with general rows, moving supports and implicit steps |
 //!
 //! What is local to a step is computed for eight steps in SIMD lanes, what depends on the step before by products of small matrices. A

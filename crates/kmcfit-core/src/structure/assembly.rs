@@ -5,11 +5,6 @@ use super::{Ends, Law, Link, MOST_ELEMENTS};
 use nalgebra::DMatrix;
 use thiserror::Error;
 
-/// Largest number of coordinates of a structure whose steps are compiled.
-const MOST_COMPILED: usize = 3;
-/// Largest number of elements of one with several coordinates.
-pub(crate) const MOST_LINKS: usize = 12;
-
 /// A structure of any number of coordinates:
 ///
 /// ```text
@@ -29,8 +24,7 @@ pub struct Structure {
     /// Places in a banded matrix, and values there, of `b b^T` for the row of each inertia and element.
     patterns: Vec<Vec<(usize, f64)>>,
     bandwidth: usize,
-    /// Elements of a structure whose steps are compiled: of up to three coordinates with a mass each, without supports, with elements between
-    /// two coordinates or a coordinate and the ground.
+    /// Elements of a structure whose steps are compiled: of one coordinate with its mass, without supports.
     links: Option<Vec<Link>>,
 }
 
@@ -129,16 +123,15 @@ impl Structure {
     }
 
     fn with_links(mut self) -> Self {
-        let n = self.coordinates;
-        let masses = (0..n).map(Ends::ground);
-        let is_small = n <= MOST_COMPILED && self.supports == 0 && masses.eq(self.inertias.clone());
-        let most = if n == 1 { MOST_ELEMENTS } else { MOST_LINKS };
-        let links = self.elements().map(|(law, ends)| {
-            let link = ends.link(law);
-            link.filter(|_| !law.has_internal_state())
-        });
-        let links: Option<Vec<Link>> = links.collect();
-        self.links = links.filter(|links| is_small && links.len() <= most);
+        let ground = Ends::ground(0);
+        let is_one = self.coordinates == 1
+            && self.supports == 0
+            && self.inertias == [Ends::ground(0)]
+            && self.ends.iter().all(|ends| *ends == ground)
+            && self.laws.len() <= MOST_ELEMENTS
+            && self.internal_states() == 0;
+        let links = self.laws.iter().map(|law| Link::grounded(*law));
+        self.links = is_one.then(|| links.collect());
         self
     }
 
@@ -184,7 +177,7 @@ impl Structure {
 
     /// True for one coordinate with its mass, and some elements between it and the ground.
     pub fn is_one(&self) -> bool {
-        self.coordinates == 1 && self.links.is_some()
+        self.links.is_some()
     }
 
     /// Elements of a structure whose steps are compiled.

@@ -1,6 +1,5 @@
 //! Combinations of coordinates.
 
-use super::{Law, Link};
 use crate::simd::Real;
 
 /// How the elongation of an element, or the acceleration of an inertia, follows from the coordinates: `sum_k factor_k q_k`.
@@ -38,16 +37,6 @@ impl Ends {
     /// Indices and factors, by index.
     pub fn entries(&self) -> &[(usize, f64)] {
         &self.0
-    }
-
-    /// An element with these ends, where they are one or two coordinates.
-    pub(super) fn link(&self, law: Law) -> Option<Link> {
-        let (from, to) = match *self.0.as_slice() {
-            [(from, 1.0)] => (from, None),
-            [(from, 1.0), (to, -1.0)] | [(to, -1.0), (from, 1.0)] => (from, Some(to)),
-            _ => return None,
-        };
-        Some(Link { law, from, to })
     }
 
     /// The combination of the values `x` of all coordinates and supports.

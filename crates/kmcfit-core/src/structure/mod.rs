@@ -16,7 +16,6 @@ mod hysteresis;
 mod law;
 mod link;
 
-pub(crate) use assembly::MOST_LINKS;
 pub use assembly::{Structure, StructureError};
 pub use ends::Ends;
 pub(crate) use hysteresis::Partials;

@@ -265,13 +265,11 @@ fn derivatives_of_predictions() {
     }
 }
 
-/// Structures whose steps are compiled have the predictions, gradients and scales of assembled ones.
+/// One coordinate, whose steps are compiled, has the predictions, gradients and scales of the assembled structure.
 #[test]
 fn compiled_steps_are_those_of_assembled_structures() {
-    for (n, method) in [1, 2, 3]
-        .into_iter()
-        .flat_map(|n| [(n, Method::Midpoint), (n, Method::Rk4)])
-    {
+    let n = 1;
+    for method in [Method::Midpoint, Method::Rk4] {
         let case = Case {
             n,
             method,
@@ -352,9 +350,6 @@ fn chains_are_recovered() {
             }
         }
         let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).expect("a fit");
-        for a in &found.attempts {
-            eprintln!("{:?} {} {:?}", a.start, a.cost, a.outcome.status);
-        }
         assert_eq!(found.outcome.status, Status::Converged, "{n}");
         let assessment = FitAssessment::of(&problem, &found, true);
         let covariance = assessment.covariance.expect("a covariance");
