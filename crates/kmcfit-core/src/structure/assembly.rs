@@ -109,7 +109,7 @@ impl Structure {
             pairs.collect()
         };
         let patterns = rows.map(pattern).collect();
-        Ok(Self {
+        let mut structure = Self {
             coordinates,
             supports,
             inertias,
@@ -118,11 +118,12 @@ impl Structure {
             patterns,
             bandwidth,
             links: None,
-        }
-        .with_links())
+        };
+        structure.find_links();
+        Ok(structure)
     }
 
-    fn with_links(mut self) -> Self {
+    fn find_links(&mut self) {
         let ground = Ends::ground(0);
         let is_one = self.coordinates == 1
             && self.supports == 0
@@ -132,12 +133,11 @@ impl Structure {
             && self.internal_states() == 0;
         let links = self.laws.iter().map(|law| Link::grounded(*law));
         self.links = is_one.then(|| links.collect());
-        self
     }
 
     /// One coordinate with its mass, and an element of each law between it and the ground.
     pub fn one(laws: Vec<Law>) -> Self {
-        Self {
+        let mut structure = Self {
             coordinates: 1,
             supports: 0,
             inertias: vec![Ends::ground(0)],
@@ -146,8 +146,9 @@ impl Structure {
             laws,
             bandwidth: 0,
             links: None,
-        }
-        .with_links()
+        };
+        structure.find_links();
+        structure
     }
 
     /// Adds elements between the first coordinate and the ground.
@@ -157,7 +158,7 @@ impl Structure {
             self.ends.push(Ends::ground(0));
             self.patterns.push(vec![(0, 1.0)]);
         }
-        *self = self.clone().with_links();
+        self.find_links();
     }
 
     /// Sets the width of Coulomb friction, m/s.
@@ -167,7 +168,7 @@ impl Structure {
                 *of_law = width;
             }
         }
-        *self = self.clone().with_links();
+        self.find_links();
     }
 
     /// Number of coordinates.

@@ -25,7 +25,7 @@ pub enum Law {
     /// `p(t)`, in N: a static force, positive in the direction of negative `x`.
     Offset,
     /// Hysteresis of Bouc and Wen: `p(t) z`, p in N/m, of an internal state with `z' = r - |z|^(n-1) (beta(t) |r| z + gamma(t) r |z|)`, `z` in m,
-    /// `beta` and `gamma` in 1/m^n. Of several coordinates only.
+    /// `beta` and `gamma` in 1/m^n (Wen, Journal of the Engineering Mechanics Division 102, 1976). Its steps are assembled.
     BoucWen {
         /// `n`, at least 1.
         exponent: u32,

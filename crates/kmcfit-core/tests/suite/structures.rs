@@ -3,7 +3,7 @@
 use crate::common::forced::{broadband, rms, white};
 use crate::common::synthetic::with_noise;
 use kmcfit_core::internals::assessment::FitAssessment;
-use kmcfit_core::internals::constraints::RowGroup;
+use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization, ScalarParameter,
     ScalarValue,
@@ -483,7 +483,7 @@ fn a_nodal_stiffness_of_a_chain_within_bounds() {
     for j in 0..nodes {
         bounds.push([(j, 1.0)], [25.0, 36.0], [grid.time(j); 2]);
     }
-    let constraints = kmcfit_core::internals::constraints::Constraints {
+    let constraints = Constraints {
         groups: vec![bounds],
         ..Default::default()
     };
@@ -494,13 +494,18 @@ fn a_nodal_stiffness_of_a_chain_within_bounds() {
             ..FitSettings::default()
         };
         let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).expect("a fit");
-        // Clarabel ends with its own tolerance in a last program.
-        let ended = [Status::Converged, Status::Stalled];
-        assert!(ended.contains(&found.outcome.status), "{qp:?}");
-        let within = |k: &f64| (25.0 - 1e-6..=36.0 + 1e-6).contains(k);
+        // Clarabel may end with its own tolerance in the last program.
+        let is_almost = qp == QpSolver::Clarabel && found.outcome.status == Status::Stalled;
+        assert!(
+            is_almost || found.outcome.status == Status::Converged,
+            "{qp:?}"
+        );
+        let slack = TOLERANCE * 36.0;
+        let within = |k: &f64| (25.0 - slack..=36.0 + slack).contains(k);
         assert!(found.best.parameters.iter().all(within));
         found.best.evaluation.cost
     });
+    // At a minimum the cost depends on the point to second order: Clarabel's tolerance of 1e-8 remains.
     assert!((costs[0] - costs[1]).abs() <= 1e-8 * costs[1], "{costs:?}");
 }
 

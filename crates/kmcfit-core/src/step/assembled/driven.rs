@@ -47,21 +47,24 @@ impl Driven<'_> {
         source: &Trajectory,
         gradient: CoefficientGradient,
     ) -> State {
-        let mut all = vec![vec![0.0; self.nodal.nodes()]; self.system.structure.functions()];
-        let mut columns: Vec<&mut [f64]> = all.iter_mut().map(Vec::as_mut_slice).collect();
-        let initial = self.with_motion(|motion| motion.adjoint(trajectory, source, &mut columns));
-        match gradient {
+        let add_to = |columns: &mut [&mut [f64]]| {
+            self.with_motion(|motion| motion.adjoint(trajectory, source, columns))
+        };
+        let initial = match gradient {
             CoefficientGradient::AtNodes(nodal) => {
-                for (to, found) in nodal.functions_mut().zip(&all) {
-                    to.iter_mut().zip(found).for_each(|(to, x)| *to += x);
-                }
+                let columns = nodal.functions_mut().map(Vec::as_mut_slice);
+                add_to(&mut columns.collect::<Vec<_>>())
             }
             CoefficientGradient::Summed(sums) => {
+                let mut all = vec![vec![0.0; self.nodal.nodes()]; sums.len()];
+                let columns = all.iter_mut().map(Vec::as_mut_slice);
+                let initial = add_to(&mut columns.collect::<Vec<_>>());
                 for (to, found) in sums.iter_mut().zip(&all) {
                     *to += found.iter().sum::<f64>();
                 }
+                initial
             }
-        }
+        };
         let components = initial.unwrap_or_else(|_| vec![f64::NAN; trajectory.components()]);
         State::of_components(trajectory.coordinates(), components)
     }

@@ -6,7 +6,8 @@
 use super::super::Trajectory;
 use super::super::engine::Driven;
 use super::super::observation::hermite;
-use super::stage::{Stage, StageShares};
+use super::stage::Stage;
+use super::stage_derivatives::StageShares;
 use crate::record::ChannelKind;
 use crate::structure::Ends;
 use crate::system::{StageSamples, TimePoint};
@@ -98,8 +99,7 @@ impl<'a> RowObserver<'a> {
     /// Derivatives of the accelerations of `row` at `place` by the force on each coordinate, and by the acceleration of each frame.
     pub fn acceleration_by_inputs(&mut self, row: &Ends, place: TimePoint) -> [Vec<f64>; 2] {
         self.solve(place);
-        let zeros = vec![0.0; self.states.coordinates()];
-        let mut weights = zeros.clone();
+        let mut weights = vec![0.0; self.states.coordinates()];
         row.spread(1.0, &mut weights);
         self.pull(&weights);
         [self.shares.forces.clone(), self.shares.frames.clone()]

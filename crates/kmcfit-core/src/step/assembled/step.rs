@@ -1,7 +1,8 @@
 //! Steps of a structure, their tangents and their transposes, stage by stage.
 
 use super::super::tableau::{At, MIDPOINT, RK4};
-use super::stage::{Scalar, Stage, StageShares, StageValues, Trouble};
+use super::stage::{Scalar, Stage, StageValues, Trouble};
+use super::stage_derivatives::StageShares;
 use crate::structure::Structure;
 use crate::system::Method;
 

@@ -3,7 +3,8 @@
 use super::super::Trajectory;
 use super::super::error::Cause;
 use super::super::tableau::At;
-use super::stage::{StageShares, StageValues, Trouble};
+use super::stage::{StageValues, Trouble};
+use super::stage_derivatives::StageShares;
 use super::step::{Source, Steps};
 use crate::structure::Structure;
 use crate::system::{Excitation, Method, StageSamples};
