@@ -45,17 +45,15 @@ impl<const N: usize, const E: usize, const S: usize> Kernel for Adjoint<'_, N, E
         let mut ends = Aligned([[[0.0; LANES]; N]; 2]);
         let mut linearised = Linearised::<_, N, E, S>::nothing(zero);
         let functions = N + model.elements().len().min(E);
+        let is_linear = model.elements().iter().all(|e| e.law.is_linear());
         let mut to = last;
         while to > 0 {
             let from = (to - 1) / LANES * LANES;
             linearised.set(arithmetic, model, &states, from);
-            step_matrices(
-                model.tableau,
-                model.dt,
-                &linearised.matrices,
-                &mut matrices,
-                zero,
-            );
+            let (tableau, dt) = (model.tableau, model.dt);
+            if to == last || !is_linear || !model.is_constant(from) {
+                step_matrices(tableau, dt, &linearised.matrices, &mut matrices, zero);
+            }
             if to - from < LANES {
                 *ends = [[[0.0; LANES]; N]; 2];
             }

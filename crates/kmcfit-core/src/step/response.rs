@@ -81,14 +81,19 @@ impl<const N: usize, const E: usize, const S: usize> Kernel for Linear<'_, N, E,
         put(&mut states, 0, &x);
         for from in (0..steps).step_by(LANES) {
             let values = EightSteps(arithmetic, model, from);
-            for s in 0..S {
-                let at = model.tableau.at[s];
-                let count = model.elements().len();
-                let stage = Stage::<_, Reciprocal<_>, N, E>::read(&values, count, at);
-                let slopes = stage.slopes(model.elements(), &[zero; N], &[zero; N]);
-                stage.matrices(model.elements(), &slopes, &mut d[s], zero);
-                if model.drives.is_some() {
-                    driven[s] = stage.accelerations(&[], &[zero; N], &[zero; N]).0;
+            let is_known = from > 0 && model.is_constant(from - LANES);
+            if !is_known || model.drives.is_some() {
+                for s in 0..S {
+                    let at = model.tableau.at[s];
+                    let count = model.elements().len();
+                    let stage = Stage::<_, Reciprocal<_>, N, E>::read(&values, count, at);
+                    if !is_known {
+                        let slopes = stage.slopes(model.elements(), &[zero; N], &[zero; N]);
+                        stage.matrices(model.elements(), &slopes, &mut d[s], zero);
+                    }
+                    if model.drives.is_some() {
+                        driven[s] = stage.accelerations(&[], &[zero; N], &[zero; N]).0;
+                    }
                 }
             }
             if model.drives.is_some() {
@@ -103,7 +108,9 @@ impl<const N: usize, const E: usize, const S: usize> Kernel for Linear<'_, N, E,
                     }
                 }
             }
-            step_matrices(model.tableau, model.dt, &d, &mut matrices, zero);
+            if !is_known {
+                step_matrices(model.tableau, model.dt, &d, &mut matrices, zero);
+            }
             for l in 0..LANES.min(steps - from) {
                 let mut by = [[0.0; N]; 2];
                 if model.drives.is_some() {

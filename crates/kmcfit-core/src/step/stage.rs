@@ -1,7 +1,7 @@
 //! The equation of motion at the stages of a step, for any number type.
 
 use super::tableau::{At, Tableau};
-use crate::simd::{Arithmetic, Eight, Real, window};
+use crate::simd::{Arithmetic, Eight, LANES, Real, window};
 use crate::structure::{Law, Link};
 
 /// Displacements and velocities of the coordinates.
@@ -52,6 +52,25 @@ impl<'a, const N: usize, const E: usize, const S: usize> Model<'a, N, E, S> {
             (1, 3) => DUFFING,
             _ => self.list,
         }
+    }
+
+    /// True if no function changes from node `from` to the end of the second group of eight steps: the matrices of both groups are
+    /// equal where the structure is linear.
+    #[inline(always)]
+    pub fn is_constant(&self, from: usize) -> bool {
+        let mut is_constant = true;
+        for values in self.masses.iter().chain(&self.coefficients) {
+            match values.get(from..).and_then(<[f64]>::first_chunk) {
+                Some(two_groups) => {
+                    let [first, others @ ..]: &[f64; 2 * LANES + 1] = two_groups;
+                    for value in others {
+                        is_constant &= value.to_bits() == first.to_bits();
+                    }
+                }
+                None => is_constant &= values.is_empty(),
+            }
+        }
+        is_constant
     }
 
     #[inline(always)]
