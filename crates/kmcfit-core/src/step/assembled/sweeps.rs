@@ -6,6 +6,7 @@ use super::super::tableau::At;
 use super::stage::{StageValues, Trouble};
 use super::stage_derivatives::StageShares;
 use super::step::{Source, Steps};
+use crate::simd::LANES;
 use crate::structure::Structure;
 use crate::system::{Excitation, Method, StageSamples};
 use thiserror::Error;
@@ -155,6 +156,9 @@ impl<'a> Motion<'a> {
     ) -> Result<Vec<f64>, MotionError> {
         let mut steps = self.steps();
         let mut shares = StageShares::zeros(self.structure);
+        // Of some neighbouring nodes: the columns of many functions lie on as many pages of memory, which cost more than the sums.
+        let functions = self.functions.len();
+        let mut gathered = vec![0.0; (LANES + 1) * functions];
         let zeros = vec![0.0; states.components()];
         let (mut x, mut next) = (zeros.clone(), zeros.clone());
         let (mut y, mut push) = (zeros.clone(), zeros);
@@ -166,12 +170,23 @@ impl<'a> Motion<'a> {
             (steps.linearise(self, i, &mut x, Some(&next)))
                 .map_err(|trouble| Self::error(i, trouble))?;
             steps.pull(&mut y, &mut shares, |at, shares| {
-                for (gradient, share) in gradient.iter_mut().zip(&shares.functions) {
-                    let [left, right] = at.shares();
-                    gradient[i] += left * share;
-                    gradient[i + 1] += right * share;
+                let [left, right] = at.shares();
+                let nodes = &mut gathered[i % LANES * functions..][..2 * functions];
+                let (at_left, at_right) = nodes.split_at_mut(functions);
+                let ends = at_left.iter_mut().zip(at_right);
+                for ((at_left, at_right), share) in ends.zip(&shares.functions) {
+                    *at_left += left * share;
+                    *at_right += right * share;
                 }
             });
+            if i % LANES == 0 {
+                for (f, gradient) in gradient.iter_mut().enumerate() {
+                    let of_function = gathered[f..].iter().step_by(functions);
+                    let nodes = gradient[i..].iter_mut().zip(of_function);
+                    nodes.for_each(|(to, found)| *to += found);
+                }
+                gathered.fill(0.0);
+            }
             source.read(i, &mut push);
             y.iter_mut().zip(&push).for_each(|(y, push)| *y += push);
         }
