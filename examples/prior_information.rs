@@ -25,7 +25,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
         .record(record)
         .method(Method::Midpoint)
         .constrain(Constraint::Shape {
-            of: CoefficientKind::Mass,
+            of: CoefficientKind::MASS,
             shape: Shape::NonIncreasing,
         })
         .build()?;

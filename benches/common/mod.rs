@@ -37,9 +37,9 @@ pub fn paper(nodes: usize) -> Problem {
     let samples = paper_readings(&system);
     let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     let list = vec![
-        CoefficientFunction::nodal(CoefficientKind::Mass, vec![2.0; nodes]),
-        CoefficientFunction::nodal(CoefficientKind::Damping, vec![1.0; nodes]),
-        CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::MASS, vec![2.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::DAMPING, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::STIFFNESS, vec![1.0; nodes]),
     ];
     let functions = Parameterization::new(list, nodes, grid.step()).expect("independent functions");
     let record = Experiment::free("free decay", initial(), nodes).with_channel(channel);
@@ -149,10 +149,10 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         })
         .collect();
     let list = vec![
-        CoefficientFunction::constant(CoefficientKind::Mass, 1.2, samples),
-        CoefficientFunction::constant(CoefficientKind::Damping, 1.0, samples),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 18.0, samples),
-        CoefficientFunction::constant(CoefficientKind::CubicStiffness, 12.0, samples),
+        CoefficientFunction::constant(CoefficientKind::MASS, 1.2, samples),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 1.0, samples),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 18.0, samples),
+        CoefficientFunction::constant(CoefficientKind::CUBIC_STIFFNESS, 12.0, samples),
     ];
     let functions =
         Parameterization::new(list, samples, grid.step()).expect("independent functions");

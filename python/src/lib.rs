@@ -53,6 +53,13 @@ mod _kmcfit {
         py.detach(|| kmcfit::cli::run(words.collect()))
     }
 
+    /// Names of the coefficient functions.
+    #[pyfunction]
+    fn coefficient_names() -> Vec<&'static str> {
+        let kinds = kmcfit_core::CoefficientKind::ALL.into_iter();
+        kinds.map(kmcfit_core::CoefficientKind::name).collect()
+    }
+
     /// Version of the package.
     #[pyfunction]
     fn version() -> &'static str {

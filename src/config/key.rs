@@ -42,7 +42,7 @@ pub struct KeyGroup {
 }
 
 /// A key.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct KeyDoc {
     /// Name in the file.
     pub name: &'static str,

@@ -3,11 +3,13 @@
 //! A new key is a new field; an optional one is an `Option`. Conditions that concern several keys are checked in
 //! `config/build/`, where the problem is built.
 
+mod by_coefficient;
 mod experiment;
 mod functions;
 mod noise;
 mod study;
 
+pub use by_coefficient::*;
 pub use experiment::*;
 pub use functions::*;
 pub use noise::*;
@@ -19,6 +21,7 @@ use super::alternatives::OneOrList;
 use super::choice::choice;
 pub use super::values::{ColumnSpec, WeightRule};
 use super::values::{Count, Format, Nodes, Number, NumberOrColumn, Text};
+use kmcfit_core::internals::functions::CoefficientKind;
 
 keys! {
     /// A model: records of one system, its coefficient functions, and the settings of the fit.
@@ -32,7 +35,7 @@ keys! {
         /// Time grid and stepper.
         grid: Option<GridSpec>, example "{nodes: 2000, method: midpoint}", default "one node per sample, rk4";
         /// Coefficient functions of the equation of motion.
-        functions: FunctionsSpec,
+        functions: ByCoefficient<Shared>,
             example "{mass: {fixed: 1.0}, damping: {basis: constant, start: 0.0}, stiffness: {basis: constant, start: 1.0}}";
         /// Constraints on the functions beyond their own `min` and `max`; one map for each.
         constraints: Option<Vec<ConstraintSpec>>, example "[{function: mass, shape: non-increasing}]", default "none";
@@ -94,7 +97,7 @@ keys! {
     /// A constraint on coefficient functions.
     pub struct ConstraintSpec (Default) = "constraint", expecting "a map such as {function: mass, shape: non-increasing}" {
         /// Constrained function.
-        function: Option<FunctionName>,
+        function: Option<CoefficientKind>,
             example "mass",
             needs "one of min, max, slope, shape, at, mean and integral";
         /// Lower bound at all times.
@@ -141,7 +144,7 @@ keys! {
             unit "that of the function times s",
             needs "`function`";
         /// Two functions; the first equals `ratio` times the second.
-        equal: Option<Vec<FunctionName>>,
+        equal: Option<Vec<CoefficientKind>>,
             example "[damping, stiffness]",
             range "two functions";
         /// Ratio of the two functions of `equal`.
@@ -326,32 +329,8 @@ keys! {
         /// Table of the true functions with times in `t_s`, relative to the model file.
         data: Text, example "truth.csv";
         /// Names of its columns.
-        columns: Option<TruthColumnsSpec>,
+        columns: Option<ByCoefficient<TruthColumns>>,
             example "{mass: m}",
             default "mass_kg, damping_N_s_per_m, stiffness_N_per_m, …";
-    }
-}
-
-keys! {
-    /// Names of the columns of the true functions.
-    pub struct TruthColumnsSpec = "truth_columns", expecting "a map such as {mass: mass_kg, damping: damping_N_s_per_m, stiffness: stiffness_N_per_m}" {
-        /// Column of the mass.
-        mass: Option<Text>, example "my_column", unit "kg", default "mass_kg";
-        /// Column of the damping.
-        damping: Option<Text>, example "my_column", unit "N s/m", default "damping_N_s_per_m";
-        /// Column of the stiffness.
-        stiffness: Option<Text>, example "my_column", unit "N/m", default "stiffness_N_per_m";
-        /// Column of the quadratic stiffness.
-        quadratic_stiffness: Option<Text>, example "my_column", unit "N/m^2";
-        /// Column of the cubic stiffness.
-        cubic_stiffness: Option<Text>, example "my_column", unit "N/m^3";
-        /// Column of the quintic stiffness.
-        quintic_stiffness: Option<Text>, example "my_column", unit "N/m^5";
-        /// Column of the quadratic damping.
-        quadratic_damping: Option<Text>, example "my_column", unit "N s^2/m^2";
-        /// Column of the Coulomb friction.
-        coulomb_friction: Option<Text>, example "my_column", unit "N";
-        /// Column of the static force.
-        static_force: Option<Text>, example "my_column", unit "N";
     }
 }

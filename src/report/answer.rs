@@ -1,11 +1,11 @@
 //! The answer of a fit as a table: estimates with their confidence intervals, units and status.
 
-use super::columns::kind_named;
 use super::document::{ResultDocument, Verdict};
 use super::ratios;
 use super::text::aligned_to;
 use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 
 /// Half-width of an interval, relative to the estimate, below which it is not printed: samples without noise.
@@ -195,7 +195,7 @@ pub fn quantity(name: &str) -> String {
         Some((first, owner)) if first != "known part" => (first, format!(" of {owner}")),
         _ => (name, String::new()),
     };
-    match kind_named(first) {
+    match CoefficientKind::named(first) {
         Some(kind) => format!("{} {}{owner}", in_words(first), kind.symbol()),
         None => name.replace('_', " "),
     }

@@ -88,7 +88,7 @@ impl FittedModel<'_> {
         let negative = self.negative_damping();
         // The warning with the interval replaces that on most times.
         let is_replaced = |warning: &&FitWarning| {
-            let damping = CoefficientKind::Damping.name();
+            let damping = CoefficientKind::DAMPING.name();
             let is_damping =
                 matches!(warning, FitWarning::Negative { function } if function == damping);
             is_damping && negative.is_some()
@@ -144,7 +144,7 @@ impl FittedModel<'_> {
     /// Warning where the whole confidence interval of a constant damping is negative.
     fn negative_damping(&self) -> Option<Finding> {
         let summaries = self.function_summaries();
-        let damping = summaries.get(CoefficientKind::Damping.name())?;
+        let damping = summaries.get(CoefficientKind::DAMPING.name())?;
         let (value, half) = (damping.min, damping.half_width()?);
         let is_constant = damping.max == value && !damping.negligible;
         (is_constant && value + half < 0.0).then(|| {

@@ -8,24 +8,11 @@ pub(super) fn interval_columns(column: &str) -> [String; 2] {
     ["lo95", "hi95"].map(|end| format!("{column}_{end}"))
 }
 
-/// Header of a quantity.
-pub(super) fn kind_named(name: &str) -> Option<CoefficientKind> {
-    let mut kinds = CoefficientKind::ALL.into_iter();
-    kinds.find(|kind| kind.name() == name)
-}
-
-pub(super) fn quantity_column(quantity: CoefficientKind, is_rotation: bool) -> &'static str {
-    match is_rotation {
-        true => quantity.angular_column(),
-        false => quantity.column(),
-    }
-}
-
 /// Header of a function; that of an experiment's own has its name.
 pub(super) fn function_column(function: &CoefficientFunction, is_rotation: bool) -> String {
-    let column = quantity_column(function.quantity, is_rotation);
+    let column = function.quantity.column(is_rotation);
     let owner = function.owner.as_deref();
-    column_of_part(column, function.is_known_part, owner)
+    column_of_part(&column, function.is_known_part, owner)
 }
 
 fn column_of_part(column: &str, is_known_part: bool, owner: Option<&str>) -> String {
@@ -59,8 +46,8 @@ pub(super) fn named_column(name: &str, is_rotation: bool) -> Option<String> {
         Some((kind, owner)) => (kind, Some(owner)),
         None => (whole, None),
     };
-    let column = quantity_column(kind_named(kind)?, is_rotation);
-    Some(column_of_part(column, part.is_some(), owner))
+    let column = CoefficientKind::named(kind)?.column(is_rotation);
+    Some(column_of_part(&column, part.is_some(), owner))
 }
 
 #[cfg(test)]
@@ -70,8 +57,8 @@ mod tests {
     #[test]
     fn names_of_functions_have_the_columns_of_the_functions() {
         for (quantity, column) in [
-            (CoefficientKind::Mass, "mass_kg"),
-            (CoefficientKind::CubicStiffness, "cubic_stiffness_N_per_m3"),
+            (CoefficientKind::MASS, "mass_kg"),
+            (CoefficientKind::CUBIC_STIFFNESS, "cubic_stiffness_N_per_m3"),
         ] {
             let function = CoefficientFunction::fixed(quantity, vec![1.0]);
             assert_eq!(function_column(&function, false), column);

@@ -1,5 +1,6 @@
 //! Residual of the equation of motion beside its forces, in words.
 
+use super::answer::in_words;
 use crate::number_format::significant;
 use kmcfit_core::internals::solvers::{EquationBalance, EquationForm};
 
@@ -28,7 +29,7 @@ pub(super) fn equation_residual(
             share if share > 1.0 => "more than the".to_owned(),
             share => format!("{} % of", significant(100.0 * share, 2)),
         };
-        format!("{beside} {} ({size} {unit})", share.part.name())
+        format!("{beside} {} ({size} {unit})", in_words(&share.part))
     });
     let residual = significant(balance.residual_rms, 3);
     format!(
@@ -40,12 +41,12 @@ pub(super) fn equation_residual(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::solvers::{EquationPart, EquationShare};
+    use kmcfit_core::internals::solvers::EquationShare;
 
     #[test]
     fn the_residual_is_a_share_of_each_force() {
-        let share = |part, rms| EquationShare {
-            part,
+        let share = |part: &str, rms| EquationShare {
+            part: part.to_owned(),
             rms,
             residual_share: 3.1 / rms,
         };
@@ -53,10 +54,7 @@ mod tests {
             form: EquationForm::Pointwise,
             bump_lengths: Vec::new(),
             residual_rms: 3.1,
-            parts: vec![
-                share(EquationPart::Damping, 6.9),
-                share(EquationPart::Inertia, 310.0),
-            ],
+            parts: vec![share("damping", 6.9), share("inertia", 310.0)],
         };
         assert_eq!(
             equation_residual(&balance, false, false),

@@ -236,7 +236,7 @@ pub fn warning(warning: &FitWarning) -> Finding {
         FitWarning::MissingTerm(missing) => format!(
             "the residuals of the equation of motion show {} that the model does not have: {} = {} {} (t = {}), {} of the largest \
              term; the other estimates are biased by it",
-            super::rivals::term_in_words(missing.term),
+            missing.term.row().words,
             missing.term.name(),
             significant(missing.value, 3),
             missing.term.unit(),

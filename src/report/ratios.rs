@@ -7,20 +7,7 @@ const OVER_MASS: &str = "_over_m";
 
 /// SI unit of the ratio of a coefficient to the mass.
 pub(super) fn unit(kind: CoefficientKind, is_rotation: bool) -> &'static str {
-    let [linear, angular] = match kind {
-        CoefficientKind::Mass => ["", ""],
-        CoefficientKind::Damping => ["1/s", "1/s"],
-        CoefficientKind::Stiffness => ["1/s^2", "1/s^2"],
-        CoefficientKind::QuadraticStiffness => ["1/(m s^2)", "1/(rad s^2)"],
-        CoefficientKind::CubicStiffness => ["1/(m^2 s^2)", "1/(rad^2 s^2)"],
-        CoefficientKind::QuinticStiffness => ["1/(m^4 s^2)", "1/(rad^4 s^2)"],
-        CoefficientKind::QuadraticDamping => ["1/m", "1/rad"],
-        CoefficientKind::CoulombFriction | CoefficientKind::Offset => ["m/s^2", "rad/s^2"],
-    };
-    match is_rotation {
-        true => angular,
-        false => linear,
-    }
+    kind.row().units_over_mass[usize::from(is_rotation)]
 }
 
 /// Name of the estimate of a function as its ratio to the unknown mass: `cubic_stiffness_over_m`, `damping_over_m of shaker`; `None` for the
@@ -60,16 +47,16 @@ mod tests {
     #[test]
     fn units_are_those_of_the_functions_per_mass() {
         for (kind, product) in [
-            (CoefficientKind::Damping, "N s/m"),
-            (CoefficientKind::Stiffness, "N/m"),
-            (CoefficientKind::CubicStiffness, "N/m^3"),
-            (CoefficientKind::QuadraticDamping, "N s^2/m^2"),
-            (CoefficientKind::Offset, "N"),
+            (CoefficientKind::DAMPING, "N s/m"),
+            (CoefficientKind::STIFFNESS, "N/m"),
+            (CoefficientKind::CUBIC_STIFFNESS, "N/m^3"),
+            (CoefficientKind::QUADRATIC_DAMPING, "N s^2/m^2"),
+            (CoefficientKind::STATIC_FORCE, "N"),
         ] {
             assert_eq!(kind.unit(), product);
         }
-        assert_eq!(unit(CoefficientKind::Damping, false), "1/s");
-        assert_eq!(unit(CoefficientKind::CubicStiffness, false), "1/(m^2 s^2)");
-        assert_eq!(unit(CoefficientKind::QuadraticDamping, true), "1/rad");
+        assert_eq!(unit(CoefficientKind::DAMPING, false), "1/s");
+        assert_eq!(unit(CoefficientKind::CUBIC_STIFFNESS, false), "1/(m^2 s^2)");
+        assert_eq!(unit(CoefficientKind::QUADRATIC_DAMPING, true), "1/rad");
     }
 }

@@ -3,7 +3,6 @@
 use crate::number_format::significant;
 use crate::report::text::and_list;
 use kmcfit_core::internals::assessment::AmplitudeRival;
-use kmcfit_core::internals::functions::CoefficientKind;
 
 /// Difference of BIC beyond which the rival is favoured.
 const FAVOURED: f64 = -10.0;
@@ -13,7 +12,7 @@ pub fn rival_in_words(rival: &AmplitudeRival) -> String {
     let terms: Vec<String> = rival
         .terms
         .iter()
-        .map(|term| term_in_words(*term).to_owned())
+        .map(|term| term.row().words.to_owned())
         .collect();
     let functions = and_list(&rival.functions);
     let verb = match rival.functions.len() {
@@ -37,18 +36,5 @@ pub fn rival_in_words(rival: &AmplitudeRival) -> String {
             "{functions} {verb} with time or with amplitude: {constants} explain the samples as well (BIC {size} {})",
             if d < 0.0 { "lower" } else { "higher" }
         ),
-    }
-}
-
-/// A term with its article.
-pub fn term_in_words(term: CoefficientKind) -> &'static str {
-    match term {
-        CoefficientKind::Offset => "a static force",
-        CoefficientKind::CoulombFriction => "Coulomb friction",
-        CoefficientKind::QuadraticDamping => "quadratic damping",
-        CoefficientKind::QuadraticStiffness => "a quadratic stiffness",
-        CoefficientKind::CubicStiffness => "a cubic stiffness",
-        CoefficientKind::QuinticStiffness => "a quintic stiffness",
-        other => other.name(),
     }
 }

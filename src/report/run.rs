@@ -22,7 +22,6 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
-use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::Excitation;
 use kmcfit_core::internals::threads::{analyses_at_once, map};
 use std::io;
@@ -291,10 +290,13 @@ impl FittedModel<'_> {
             terms: (problem.functions.coefficient_set(0).iter().skip(1))
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
-            friction_width: problem.system.laws().iter().find_map(|t| match t {
-                Law::CoulombFriction { width } => Some(*width),
-                _ => None,
-            }),
+            widths: (problem.functions.coefficient_set(0).iter().skip(1))
+                .zip(problem.system.laws())
+                .filter_map(|(f, law)| {
+                    let name = problem.functions.get(*f).quantity.name();
+                    Some((name.to_owned(), law.width()?))
+                })
+                .collect(),
             cost_kind: CostKind::of(problem, self.model.settings.solver),
             cost_definition: {
                 let balance = self.run_assessment.balance.as_ref();

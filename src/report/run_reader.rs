@@ -243,12 +243,13 @@ fn system(
     let mut steppers = [Method::Midpoint, Method::Rk4].into_iter();
     let method = steppers.find(|m| m.name() == model.stepper);
     let method = method.ok_or_else(|| unusable(format!("stepper `{}`", model.stepper)))?;
-    let width = model.friction_width.unwrap_or(f64::NAN);
-    let known = |name: &String| CoefficientKind::ALL.into_iter().find(|q| q.name() == name);
+    let known = |name: &String| CoefficientKind::named(name);
     let quantities: Option<Vec<CoefficientKind>> = model.terms.iter().map(known).collect();
     let no_terms = || unusable(format!("terms {:?}", model.terms));
     let quantities = quantities.ok_or_else(no_terms)?;
-    let terms: Vec<Law> = quantities.iter().filter_map(|q| q.term(width)).collect();
+    let width = |q: &CoefficientKind| model.widths.get(q.name()).copied().unwrap_or(f64::NAN);
+    let terms = quantities.iter().filter_map(|q| q.law(width(q)));
+    let terms: Vec<Law> = terms.collect();
     if !terms.starts_with(&[Law::Damping, Law::Stiffness]) {
         return Err(no_terms());
     }
@@ -357,22 +358,17 @@ fn coefficients(
     nodes: usize,
     steps: usize,
 ) -> Result<NodalCoefficients, InputError> {
+    let mass_of_rotation = CoefficientKind::MASS.column(true);
     let is_rotation = table
-        .column(&format!(
-            "{prefix}{}",
-            CoefficientKind::Mass.angular_column()
-        ))
+        .column(&format!("{prefix}{mass_of_rotation}"))
         .is_some();
     let column = |quantity: CoefficientKind| {
-        let name = match is_rotation {
-            true => quantity.angular_column(),
-            false => quantity.column(),
-        };
+        let name = quantity.column(is_rotation);
         let rows = table.finite(&format!("{prefix}{name}"))?;
         Ok(at_nodes(rows, nodes, steps))
     };
     Ok::<_, InputError>(NodalCoefficients {
-        inertias: vec![column(CoefficientKind::Mass)?],
+        inertias: vec![column(CoefficientKind::MASS)?],
         coefficients: quantities
             .iter()
             .map(|q| column(*q))

@@ -1,7 +1,7 @@
 //! The tables of a fit.
 
 use super::FittedModel;
-use super::columns::{function_column, interval_columns, named_column, quantity_column};
+use super::columns::{function_column, interval_columns, named_column};
 use super::csv::CsvTable;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
@@ -129,7 +129,7 @@ impl FittedModel<'_> {
         if let Some(truth) = &self.model.truth {
             let functions = self.model.problem.functions.iter();
             for (function, values) in functions.zip(truth.functions()) {
-                let name = format!("true_{}", quantity_column(function.quantity, is_rotation));
+                let name = format!("true_{}", function.quantity.column(is_rotation));
                 table = table.column(name, rows(values));
             }
         }

@@ -4,7 +4,7 @@ use super::document::{Estimates, Verdict};
 use super::fit_assessment::ValidationRecord;
 use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;
-use super::rivals::{rival_in_words, term_in_words};
+use super::rivals::rival_in_words;
 use super::run::FittedModel;
 use super::suggestions::percent;
 use super::text::and_list;
@@ -381,7 +381,7 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         }
         VerdictReason::MissingTerm(missing) => format!(
             "the residuals show {} that the model does not have",
-            term_in_words(missing.term)
+            missing.term.row().words
         ),
         VerdictReason::TimeOrAmplitude(rival) => rival_in_words(rival),
         VerdictReason::ResidualMean {
@@ -548,13 +548,13 @@ pub fn assumption(assumption: &VerdictAssumption) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::solvers::{EquationForm, EquationPart, EquationShare};
+    use kmcfit_core::internals::solvers::{EquationForm, EquationShare};
 
     #[test]
     fn a_residual_is_judged_beside_the_largest_force() {
         let reason = |residual: f64| {
-            let share = |part, rms| EquationShare {
-                part,
+            let share = |part: &str, rms| EquationShare {
+                part: part.to_owned(),
                 rms,
                 residual_share: residual / rms,
             };
@@ -562,10 +562,7 @@ mod tests {
                 form: EquationForm::Weak,
                 bump_lengths: Vec::new(),
                 residual_rms: residual,
-                parts: vec![
-                    share(EquationPart::Damping, 5.0),
-                    share(EquationPart::Inertia, 100.0),
-                ],
+                parts: vec![share("damping", 5.0), share("inertia", 100.0)],
             })
         };
         // More than the damping, but a tenth of the inertia.

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use kmcfit::config::ModelFile;
 use kmcfit::config::alternatives::ScalarOr;
 use kmcfit::config::spec::{
-    Basis, FitMethod, Gradient, InitialSpec, PenaltyKind, PenaltySpec, StepMethod, WeightRule,
+    Basis, ByCoefficient, FitMethod, FunctionSpec, Gradient, InitialSpec, PenaltyKind, PenaltySpec,
+    Shared, StepMethod, WeightRule,
 };
 use kmcfit::config::values::{
     Bound, ColumnId, Count, KnotSpec, KnownValue, Nodes, Number, NumberOrColumn, NumberOrEstimate,
     Sigma, StartSpec, Weight,
 };
+use kmcfit_core::CoefficientKind;
 
 pub const FULL: &str = "\
 format: 1
@@ -53,6 +55,10 @@ functions:
   stiffness: {basis: nodal}
 ";
 
+fn of(functions: &ByCoefficient<Shared>, kind: CoefficientKind) -> FunctionSpec {
+    functions.get(kind).expect("a required function").clone()
+}
+
 #[test]
 fn every_key_is_read() {
     let spec = ModelFile::parse("m.yaml", FULL).unwrap().spec;
@@ -80,9 +86,15 @@ fn every_key_is_read() {
     assert_eq!(grid.duration.map(|n| n.0), Some(25.0));
 
     let functions = spec.functions;
-    assert_eq!(functions.mass.basis, Some(Basis::Nodal));
-    assert_eq!(functions.mass.start, Some(StartSpec::Number(Number(2.0))));
-    let Some(StartSpec::Column(start)) = functions.damping.start else {
+    assert_eq!(
+        of(&functions, CoefficientKind::MASS).basis,
+        Some(Basis::Nodal)
+    );
+    assert_eq!(
+        of(&functions, CoefficientKind::MASS).start,
+        Some(StartSpec::Number(Number(2.0)))
+    );
+    let Some(StartSpec::Column(start)) = of(&functions, CoefficientKind::DAMPING).start else {
         panic!("a column")
     };
     assert_eq!(
@@ -90,7 +102,7 @@ fn every_key_is_read() {
         ("start.csv", "damping_N_s_per_m")
     );
     assert_eq!(
-        functions.stiffness.fixed,
+        of(&functions, CoefficientKind::STIFFNESS).fixed,
         Some(KnownValue::Number(Number(1.0)))
     );
 
@@ -109,9 +121,18 @@ fn every_key_is_read() {
     let truth = spec.truth.unwrap();
     assert_eq!(&*truth.data, "../data/paper_truth.csv");
     let columns = truth.columns.unwrap();
-    assert_eq!(columns.mass.as_deref(), Some("mass_kg"));
-    assert_eq!(columns.damping.as_deref(), Some("damping_N_s_per_m"));
-    assert_eq!(columns.stiffness.as_deref(), Some("stiffness_N_per_m"));
+    assert_eq!(
+        columns.get(CoefficientKind::MASS).map(|c| &*c.0),
+        Some("mass_kg")
+    );
+    assert_eq!(
+        columns.get(CoefficientKind::DAMPING).map(|c| &*c.0),
+        Some("damping_N_s_per_m")
+    );
+    assert_eq!(
+        columns.get(CoefficientKind::STIFFNESS).map(|c| &*c.0),
+        Some("stiffness_N_per_m")
+    );
     assert_eq!(spec.predict.unwrap()[0].velocity, Number(1.001));
 }
 
@@ -123,7 +144,7 @@ fn shapes_limits_and_penalties_are_read() {
         .replace("stiffness: {basis: nodal}", "stiffness: {basis: polynomial, degree: 3, penalty: [{kind: tikhonov, order: 0, weight: 1e-3, reference: 1}, {kind: tikhonov, order: 2, weight: reml}]}");
     let functions = ModelFile::parse("m.yaml", text).unwrap().spec.functions;
 
-    let mass = functions.mass;
+    let mass = of(&functions, CoefficientKind::MASS);
     assert_eq!(mass.basis, Some(Basis::PiecewiseLinear));
     assert_eq!(mass.knots, Some(KnotSpec::Count(Count(11))));
     let list = vec![Number(1.0), Number(2.5)];
@@ -135,7 +156,7 @@ fn shapes_limits_and_penalties_are_read() {
     };
     assert_eq!((&*max.data, &*max.column), ("m.csv", "m"));
 
-    let damping = functions.damping;
+    let damping = of(&functions, CoefficientKind::DAMPING);
     assert_eq!(damping.basis, Some(Basis::BSpline));
     let times = [0.0, 1.5, 3.0].map(Number).to_vec();
     assert_eq!(damping.knots, Some(KnotSpec::Times(times)));
@@ -156,7 +177,7 @@ fn shapes_limits_and_penalties_are_read() {
     let expected = [("[0]".to_owned(), &slope), ("[1]".to_owned(), &variation)];
     assert_eq!(two, expected);
 
-    let stiffness = functions.stiffness;
+    let stiffness = of(&functions, CoefficientKind::STIFFNESS);
     assert_eq!(stiffness.degree, Some(Count(3)));
     let many: Vec<_> = stiffness.penalty.iter().flat_map(|s| s.iter()).collect();
     let reference = NumberOrColumn::Number(Number(1.0));

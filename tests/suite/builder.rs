@@ -70,12 +70,12 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
         .tikhonov(0, 0.01)
         .tikhonov(1, 0.1);
     let stiffness = CoefficientSpec::polynomial(&[1.5, -0.01]).max(4.0);
-    let of = CoefficientKind::Mass;
+    let of = CoefficientKind::MASS;
     let built = Builder::new([mass, damping, stiffness])
         .record(paper_record())
         .method(Method::Midpoint)
         .constrain(Constraint::Value {
-            of: CoefficientKind::Stiffness,
+            of: CoefficientKind::STIFFNESS,
             at: 0.0,
             value: 1.0,
         })
@@ -184,7 +184,7 @@ fn invalid_parts_are_refused_with_their_key() {
     let values = [1.0, 0.5, 0.2];
     let short = || Record::new("short").from_state(1.0, 0.0);
     let mass = |spec: CoefficientSpec| Builder::new([spec, one(), one()]).record(record());
-    let of = CoefficientKind::Mass;
+    let of = CoefficientKind::MASS;
     let cases: Vec<(Builder, &str)> = vec![
         (Builder::new(system()), "experiments: there are no records"),
         (
@@ -372,7 +372,7 @@ fn invalid_parts_are_refused_with_their_key() {
         ),
         (
             Builder::new(system())
-                .record(record().coefficient(CoefficientKind::CubicStiffness, one())),
+                .record(record().coefficient(CoefficientKind::CUBIC_STIFFNESS, one())),
             "experiments[0].functions.cubic_stiffness: the system has no such function",
         ),
         (

@@ -125,9 +125,9 @@ fn rms(values: &[f64]) -> f64 {
 /// Mass known, damping and stiffness free at every node.
 fn free_at_nodes(nodes: usize) -> Vec<CoefficientFunction> {
     vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
-        CoefficientFunction::nodal(CoefficientKind::Damping, vec![0.0; nodes]),
-        CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.0; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::DAMPING, vec![0.0; nodes]),
+        CoefficientFunction::nodal(CoefficientKind::STIFFNESS, vec![1.0; nodes]),
     ]
 }
 
@@ -177,11 +177,11 @@ fn constants(mass: Option<f64>) -> Vec<CoefficientFunction> {
     let constant = |quantity, start| CoefficientFunction::constant(quantity, start, NODES);
     vec![
         match mass {
-            Some(mass) => CoefficientFunction::fixed(CoefficientKind::Mass, vec![mass; NODES]),
-            None => constant(CoefficientKind::Mass, 1.0),
+            Some(mass) => CoefficientFunction::fixed(CoefficientKind::MASS, vec![mass; NODES]),
+            None => constant(CoefficientKind::MASS, 1.0),
         },
-        constant(CoefficientKind::Damping, 0.0),
-        constant(CoefficientKind::Stiffness, 1.0),
+        constant(CoefficientKind::DAMPING, 0.0),
+        constant(CoefficientKind::STIFFNESS, 1.0),
     ]
 }
 
@@ -254,9 +254,9 @@ fn constraints_and_soft_constraints() {
             CoefficientFunction::free(quantity, basis.clone(), &grid, vec![start; 41])
         };
         vec![
-            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
-            free(CoefficientKind::Damping, 0.0),
-            free(CoefficientKind::Stiffness, 150.0),
+            CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; NODES]),
+            free(CoefficientKind::DAMPING, 0.0),
+            free(CoefficientKind::STIFFNESS, 150.0),
         ]
     };
     let (plain, _) = shaken(2, list());
@@ -331,9 +331,9 @@ fn the_cost_is_the_integral_of_the_squared_error() {
         let channel = Channel::displacement_at_nodes(observed, stride, weighting, &grid);
         let initial = State::one(1.0, 0.0);
         let list = vec![
-            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
-            CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.0; nodes]),
-            CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.5; nodes]),
+            CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]),
+            CoefficientFunction::fixed(CoefficientKind::DAMPING, vec![0.0; nodes]),
+            CoefficientFunction::nodal(CoefficientKind::STIFFNESS, vec![1.5; nodes]),
         ];
         let experiment = Experiment::free("harmonic", initial, nodes).with_channel(channel);
         let found = run(&problem_of(system, list, experiment));

@@ -93,17 +93,17 @@ pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
         ActiveGroup, Attempt, BoundedValue, ConditionFailure, EquationBalance, EquationForm,
-        EquationPart, EquationShare, Fit, FitSettings, GridNotice, Initial, IterationEvent,
-        IterationRecord, Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes,
-        Optimality, PathPoint, QpSolver, Reason, Solver, StartProjection, StartStrategy, Status,
-        Stopping, UnsupportedRecord, WeightPath, active_constraints, choose_weight,
-        choose_weight_watched, equation_balance, equation_error, equation_rows, fit, fit_from,
-        fit_on_refined_grids, fit_with_noise, fit_with_noise_watched, missing_terms, no_response,
-        number_or_nan, predict_validation, timed,
+        EquationShare, Fit, FitSettings, GridNotice, Initial, IterationEvent, IterationRecord,
+        Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes, Optimality, PathPoint,
+        QpSolver, Reason, Solver, StartProjection, StartStrategy, Status, Stopping,
+        UnsupportedRecord, WeightPath, active_constraints, choose_weight, choose_weight_watched,
+        equation_balance, equation_error, equation_rows, fit, fit_from, fit_on_refined_grids,
+        fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
+        predict_validation, timed,
     };
 }
 pub mod structure {
-    pub use crate::structure::{Ends, Law, Structure};
+    pub use crate::structure::{CoefficientRow, Ends, Law, Structure};
 }
 pub mod study {
     pub use crate::study::{

@@ -45,7 +45,7 @@
 //! let fit = problem.fit()?;
 //!
 //! assert_eq!(fit.outcome.status, Status::Converged);
-//! let mass = problem.coefficient(CoefficientKind::Mass, &fit.best.parameters).ok_or("a mass")?;
+//! let mass = problem.coefficient(CoefficientKind::MASS, &fit.best.parameters).ok_or("a mass")?;
 //! let error = mass.iter().zip(&truth.inertias[0]).map(|(m, t)| (m - t).abs()).fold(0.0, f64::max);
 //! assert!(error < 1e-9, "{error}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())

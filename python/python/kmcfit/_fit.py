@@ -20,21 +20,7 @@ from ._page import Drawing, first_screen, read_files, write_files
 from ._study import Study
 
 #: Quantities over time in `functions.csv`.
-_CURVES = (
-    "mass",
-    "damping",
-    "stiffness",
-    "quadratic_stiffness",
-    "cubic_stiffness",
-    "quintic_stiffness",
-    "quadratic_damping",
-    "coulomb_friction",
-    "static_force",
-    "k_over_m",
-    "c_over_m",
-    "natural_frequency",
-    "damping_ratio",
-)
+_CURVES = (*_kmcfit.coefficient_names(), "k_over_m", "c_over_m", "natural_frequency", "damping_ratio")
 
 
 class Fit:

@@ -17,15 +17,8 @@ from ._functions import lowered, plain
 from ._problem import Problem
 from ._study import Study
 
-#: Coefficient functions beside mass, damping and stiffness.
-FURTHER = (
-    "quadratic_stiffness",
-    "cubic_stiffness",
-    "quintic_stiffness",
-    "quadratic_damping",
-    "coulomb_friction",
-    "static_force",
-)
+#: Coefficient functions.
+COEFFICIENTS = tuple(_kmcfit.coefficient_names())
 _UNKNOWN_MASS = {"fixed": "unknown"}
 _FROM_RECORD = {"basis": "constant"}
 #: Fit settings of `kmcfit init`.
@@ -46,8 +39,8 @@ class Model:
         Coefficient functions, kg, N s/m and N/m; a number is a fixed value. Without a mass it is a constant, estimated, for records of
         which one has a force; for others it is unknown, and the other coefficients are ratios to it. Damping and stiffness are constants by
         default, estimated from the record.
-    quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force : optional
-        Further coefficient functions.
+    **functions : optional
+        Further coefficient functions by their names in a model file: ``cubic_stiffness``, ``quadratic_damping``, ``coulomb_friction``, ...
     constraints : list of dict, optional
         Linear constraints, e.g. ``[{"function": "mass", "shape": "non-increasing"}]``.
     grid : dict, optional
@@ -82,9 +75,8 @@ class Model:
         **functions: Any,
     ) -> None:
         for word in functions:
-            if word not in FURTHER:
-                known = ["mass", "damping", "stiffness", *FURTHER]
-                known += ["constraints", "grid", "fit", "title", "truth", "predict", "study"]
+            if word not in COEFFICIENTS:
+                known = [*COEFFICIENTS, "constraints", "grid", "fit", "title", "truth", "predict", "study"]
                 raise unknown_keyword("Model", word, known)
         given = {
             "mass": _UNKNOWN_MASS if mass is None else mass,

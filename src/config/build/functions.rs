@@ -4,11 +4,11 @@ use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::config::build::Place;
 use crate::config::spec::{
-    self as config, Basis, ColumnSpec, ExperimentSpec, FunctionSpec, PenaltyKind, WeightRule,
+    self as config, Basis, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec, PenaltyKind,
+    WeightRule,
 };
 use crate::config::values::{
-    Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Text,
-    Weight,
+    Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Weight,
 };
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
@@ -24,40 +24,19 @@ use kmcfit_core::internals::system::{Grid, NodalCoefficients};
 /// response follows the force at all frequencies.
 const LEAST_MASS: f64 = 1e-3;
 
-/// The function of a kind in a map with one key for each function.
-macro_rules! by_kind {
-    ($map:expr, $kind:expr) => {
-        match $kind {
-            CoefficientKind::Mass => Option::from(&$map.mass),
-            CoefficientKind::Damping => Option::from(&$map.damping),
-            CoefficientKind::Stiffness => Option::from(&$map.stiffness),
-            CoefficientKind::QuadraticStiffness => $map.quadratic_stiffness.as_ref(),
-            CoefficientKind::CubicStiffness => $map.cubic_stiffness.as_ref(),
-            CoefficientKind::QuinticStiffness => $map.quintic_stiffness.as_ref(),
-            CoefficientKind::QuadraticDamping => $map.quadratic_damping.as_ref(),
-            CoefficientKind::CoulombFriction => $map.coulomb_friction.as_ref(),
-            CoefficientKind::Offset => $map.static_force.as_ref(),
-        }
-    };
-}
-
 /// A coefficient function of the model file: kind and settings.
 pub(super) type Given<'a> = (CoefficientKind, &'a FunctionSpec);
 
 /// The functions common to all experiments, mass first.
 pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
-    let kinds = CoefficientKind::ALL.into_iter();
-    kinds
-        .filter_map(|kind| Some((kind, by_kind!(file.spec.functions, kind)?)))
-        .collect()
+    file.spec.functions.iter().collect()
 }
 
 /// The functions of an experiment alone.
 pub(super) fn own(spec: &ExperimentSpec) -> Vec<Given<'_>> {
-    let kinds = CoefficientKind::ALL.into_iter();
-    let own = spec.functions.as_ref();
-    let of_kind = |kind| Some((kind, own.and_then(|own| by_kind!(own, kind))?));
-    kinds.filter_map(of_kind).collect()
+    (spec.functions.iter())
+        .flat_map(ByCoefficient::iter)
+        .collect()
 }
 
 /// All functions of the model.
@@ -132,7 +111,7 @@ pub(super) fn specification(
         }
     };
     spec = spec.bounds(bound("min", &given.min)?, bound("max", &given.max)?);
-    if given.min.is_none() && defaults.is_limited && kind == CoefficientKind::Mass {
+    if given.min.is_none() && defaults.is_limited && kind == CoefficientKind::MASS {
         spec = spec.min_of_start(LEAST_MASS);
     }
     for (place, given) in given.penalty.iter().flat_map(|list| list.iter()) {
@@ -159,8 +138,12 @@ fn refuse_negative_stiffness(
         KnownValue::Unknown => None,
     };
     let functions = &at.file.spec.functions;
-    let is_stiffened = functions.cubic_stiffness.is_some() || functions.quintic_stiffness.is_some();
-    match value.filter(|value| *value < 0.0 && kind == CoefficientKind::Stiffness) {
+    let stiffening = [
+        CoefficientKind::CUBIC_STIFFNESS,
+        CoefficientKind::QUINTIC_STIFFNESS,
+    ];
+    let is_stiffened = stiffening.iter().any(|kind| functions.get(*kind).is_some());
+    match value.filter(|value| *value < 0.0 && kind == CoefficientKind::STIFFNESS) {
         Some(value) if !is_stiffened => Err(at
             .error_in(
                 "fixed",
@@ -235,7 +218,8 @@ const UNKNOWN_MASS: &str = "functions.mass.fixed";
 
 /// True if the model states that the mass is unknown.
 pub(super) fn has_unknown_mass(file: &ModelFile) -> bool {
-    file.spec.functions.mass.fixed == Some(KnownValue::Unknown)
+    let mass = file.spec.functions.get(CoefficientKind::MASS);
+    mass.is_some_and(|mass| mass.fixed == Some(KnownValue::Unknown))
 }
 
 /// Error for an unknown mass where a force or another known value determines the scale of the coefficients.
@@ -452,10 +436,10 @@ pub(super) fn truth(
     };
     let at = Place::new(file, "truth");
     let column = |(kind, _): Given| {
-        let named: Option<&Text> = (spec.columns.as_ref()).and_then(|c| by_kind!(c, kind));
-        let name = named.map_or(kind.column(), |name| name.0.as_str());
+        let named = spec.columns.as_ref().and_then(|columns| columns.get(kind));
+        let name = named.map_or_else(|| kind.column(false), |name| name.0.clone());
         let column = at.below(&format!("columns.{}", kind.name()));
-        column_on_grid((&spec.data.0, &at.below("data")), (name, &column), grid)
+        column_on_grid((&spec.data.0, &at.below("data")), (&name, &column), grid)
     };
     let mut list = shared(file).into_iter();
     let mass = list.next().map(&column).transpose()?.unwrap_or_default();

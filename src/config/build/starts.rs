@@ -38,7 +38,7 @@ pub(super) fn of_records(
     let record = used.find_map(|(_, record)| record.as_ref().filter(|r| !r.channels.is_empty()))?;
     let channel = record.channels.first()?;
     let [mass, stiffness] =
-        [CoefficientKind::Mass, CoefficientKind::Stiffness].map(|kind| stated(file, grid, kind));
+        [CoefficientKind::MASS, CoefficientKind::STIFFNESS].map(|kind| stated(file, grid, kind));
     let (omega, ratio, driven) = match oscillator(record, channel) {
         Some([m, c, k]) => ((k / m).sqrt(), 0.5 * c / (k * m).sqrt(), Some(m)),
         None => {
@@ -58,9 +58,9 @@ pub(super) fn of_records(
         .unwrap_or(1.0);
     let stiffness = mass * omega * omega;
     Some([
-        (CoefficientKind::Mass, mass),
-        (CoefficientKind::Damping, 2.0 * ratio * mass * omega),
-        (CoefficientKind::Stiffness, stiffness),
+        (CoefficientKind::MASS, mass),
+        (CoefficientKind::DAMPING, 2.0 * ratio * mass * omega),
+        (CoefficientKind::STIFFNESS, stiffness),
     ])
 }
 

@@ -4,11 +4,12 @@ use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
 use crate::config::build::Place;
-use crate::config::spec::{CandidateSpec, EquivalentSpec, FunctionName, ProfileSpec, StudySpec};
+use crate::config::spec::{CandidateSpec, EquivalentSpec, ProfileSpec, StudySpec};
 use crate::config::values::{Count, Number};
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
@@ -300,7 +301,7 @@ fn target(
 fn function(
     at: &Place<'_>,
     problem: &Problem,
-    quantity: FunctionName,
+    quantity: CoefficientKind,
 ) -> Result<usize, InputError> {
     let main = problem.functions.coefficient_set(0);
     let of = |f: &&usize| problem.functions.get(**f).quantity == quantity;

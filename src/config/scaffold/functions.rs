@@ -20,7 +20,7 @@ const OTHERS: &str = "\
 /// The section `functions`. Start values are left out: they follow from the records.
 pub(super) fn functions(records: &[FileRecord], statements: &Statements) -> String {
     let fixed = |value: f64| format!("{{fixed: {value:?}}}");
-    let mass = statements.known(CoefficientKind::Mass);
+    let mass = statements.known(CoefficientKind::MASS);
     let (mass, comment) = match (mass, is_unknown(records, statements)) {
         (Some(mass), _) => (fixed(mass), "kg; as stated"),
         (None, true) => (
@@ -35,13 +35,13 @@ pub(super) fn functions(records: &[FileRecord], statements: &Statements) -> Stri
     let [damping, stiffness] = match is_unknown(records, statements) {
         true => ["1/s, ratio to the mass", "1/s^2, ratio to the mass"],
         false => [
-            CoefficientKind::Damping.unit(),
-            CoefficientKind::Stiffness.unit(),
+            CoefficientKind::DAMPING.unit(),
+            CoefficientKind::STIFFNESS.unit(),
         ],
     };
     let stated = |kind| statements.known(kind);
     let value = |kind| stated(kind).map_or("{basis: constant}".to_owned(), fixed);
-    let (c, k) = (CoefficientKind::Damping, CoefficientKind::Stiffness);
+    let (c, k) = (CoefficientKind::DAMPING, CoefficientKind::STIFFNESS);
     let comment_of = |kind, unit: &str, start: &str| match stated(kind) {
         Some(_) => format!("{unit}; as stated"),
         None => format!("{unit}; {start}"),

@@ -63,9 +63,9 @@ impl Statements {
     /// For another name, and for a value that is no number or a mass that is not positive.
     pub fn fix(&mut self, option: &str, name: &str, text: &str) -> Result<(), InputError> {
         const KINDS: [CoefficientKind; 3] = [
-            CoefficientKind::Mass,
-            CoefficientKind::Damping,
-            CoefficientKind::Stiffness,
+            CoefficientKind::MASS,
+            CoefficientKind::DAMPING,
+            CoefficientKind::STIFFNESS,
         ];
         let kind = KINDS.into_iter().find(|kind| kind.name() == name.trim());
         let kind = kind.ok_or_else(|| {
@@ -74,7 +74,7 @@ impl Statements {
                 .expected(one_of(KINDS.map(CoefficientKind::name)))
         })?;
         let (least, range) = match kind {
-            CoefficientKind::Mass => (f64::MIN_POSITIVE, " greater than 0"),
+            CoefficientKind::MASS => (f64::MIN_POSITIVE, " greater than 0"),
             _ => (f64::MIN, ""),
         };
         let value = text

@@ -3,7 +3,7 @@
 use super::noise::{InputSigmaSpec, NoisesSpec};
 use crate::config::map::keys;
 
-use super::{OwnFunctionsSpec, RangeSpec};
+use super::{ByCoefficient, Own, RangeSpec};
 use crate::config::alternatives::{OneOrList, ScalarOr};
 use crate::config::choice::choice;
 use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate};
@@ -101,7 +101,7 @@ keys! {
         /// Initial state, or `estimate` for displacement and velocity.
         initial: InitialSpec, example "{displacement: 3.3, velocity: 1.0}";
         /// Coefficient functions of this experiment alone.
-        functions: Option<OwnFunctionsSpec>,
+        functions: Option<ByCoefficient<Own>>,
             example "{damping: {basis: constant, start: 1.0}}",
             default "none",
             needs "the same function in the shared `functions`";

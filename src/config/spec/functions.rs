@@ -8,69 +8,6 @@ use crate::config::values::{
 };
 
 keys! {
-    /// Coefficient functions of the system; mass, damping and stiffness are required.
-    pub struct FunctionsSpec = "functions", expecting "a map with the keys mass, damping, stiffness" {
-        /// Mass m(t).
-        mass: FunctionSpec, example "{basis: nodal, start: 2.0}", unit "kg";
-        /// Damping c(t), with the force c y'.
-        damping: FunctionSpec, example "{basis: constant, start: 1.0}", unit "N s/m";
-        /// Stiffness k(t), with the force k y.
-        stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
-        /// Quadratic stiffness k2(t), with the force k2 y^2: the asymmetric part of a spring.
-        quadratic_stiffness: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.0}",
-            unit "N/m^2",
-            default "none";
-        /// Cubic stiffness k3(t), with the force k3 y^3.
-        cubic_stiffness: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.0}",
-            unit "N/m^3",
-            default "none";
-        /// Quintic stiffness k5(t), with the force k5 y^5.
-        quintic_stiffness: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.0}",
-            unit "N/m^5",
-            default "none";
-        /// Quadratic damping c2(t), with the force c2 |y'| y'.
-        quadratic_damping: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.0}",
-            unit "N s^2/m^2",
-            default "none";
-        /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
-        coulomb_friction: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.5, width: 0.01}",
-            unit "N",
-            default "none";
-        /// Static force, which acts against positive y.
-        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "none";
-    }
-}
-
-keys! {
-    /// Coefficient functions of one experiment, in place of the shared ones.
-    pub struct OwnFunctionsSpec (Default) = "own_functions", expecting "a map such as {damping: {basis: constant, start: 1.0}}" {
-        /// Mass m(t) of this experiment.
-        mass: Option<FunctionSpec>, example "{basis: constant, start: 2.0}", unit "kg";
-        /// Damping c(t) of this experiment.
-        damping: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N s/m";
-        /// Stiffness k(t) of this experiment.
-        stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
-        /// Quadratic stiffness, with the force k2 y^2.
-        quadratic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^2";
-        /// Cubic stiffness, with the force k3 y^3.
-        cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
-        /// Quintic stiffness, with the force k5 y^5.
-        quintic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^5";
-        /// Quadratic damping, with the force c2 |y'| y'.
-        quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
-        /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
-        coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
-        /// Static force, which acts against positive y.
-        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N";
-    }
-}
-
-keys! {
     /// A coefficient function: estimated, with a basis and start values, or fixed.
     pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
         /// Basis of an estimated function, which defines its parameters.
@@ -131,12 +68,12 @@ keys! {
             example "{kind: tikhonov, order: 2, weight: 0.1}",
             default "none",
             needs "`basis`";
-        /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the response.
+        /// Width of the law of the coefficient. Coulomb friction: velocity in m/s over which its sign is smoothed, well below the peak
+        /// velocity of the response.
         width: Option<Number>,
             example "0.01",
-            unit "m/s",
             range "greater than 0",
-            needs "coulomb_friction, which requires it";
+            needs "a coefficient whose law has a width, which requires it";
     }
 }
 
@@ -193,31 +130,5 @@ choice! {
         Tikhonov = "tikhonov",
         /// Total variation.
         TotalVariation = "tv",
-    }
-}
-
-impl FunctionSpec {}
-
-choice! {
-    /// Name of a coefficient function.
-    pub type FunctionName = kmcfit_core::internals::functions::CoefficientKind {
-        /// Mass m(t).
-        Mass = "mass",
-        /// Damping c(t).
-        Damping = "damping",
-        /// Stiffness k(t).
-        Stiffness = "stiffness",
-        /// Quadratic stiffness.
-        QuadraticStiffness = "quadratic_stiffness",
-        /// Cubic stiffness.
-        CubicStiffness = "cubic_stiffness",
-        /// Quintic stiffness.
-        QuinticStiffness = "quintic_stiffness",
-        /// Quadratic damping.
-        QuadraticDamping = "quadratic_damping",
-        /// Coulomb friction.
-        CoulombFriction = "coulomb_friction",
-        /// Static force.
-        Offset = "static_force",
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::config::map::keys;
 
-use super::{ForceSpec, FunctionName, StateSpec};
+use super::{ForceSpec, StateSpec};
 use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::values::{Count, Number, NumberOrColumn, Text};
+use kmcfit_core::internals::functions::CoefficientKind;
 
 keys! {
     /// Analyses of `kmcfit study`.
@@ -63,7 +64,7 @@ keys! {
     /// A quantity: value or mean of a function, a constant, or a nuisance parameter.
     pub struct ProfileSpec = "profile", expecting "a map such as {function: mass, at: 0.0}" {
         /// Function.
-        function: Option<FunctionName>,
+        function: Option<CoefficientKind>,
             example "mass",
             needs "an estimated function; excludes `scalar`";
         /// Time of the value.

@@ -170,9 +170,9 @@ pub struct ModelSummary {
     /// The force terms, by the names of their functions.
     #[serde(default = "linear_terms")]
     pub terms: Vec<String>,
-    /// Width of Coulomb friction, m/s, if the model has friction.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub friction_width: Option<f64>,
+    /// Widths of the laws that have one, by the names of their functions: m/s for Coulomb friction.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub widths: BTreeMap<String, f64>,
     /// Kind of the misfit in J: `integral`, `chi-square`, `mixed` or `equation-error`.
     pub cost_kind: CostKind,
     /// Formula of J with all factors, as a sentence.
@@ -335,8 +335,8 @@ impl ResultDocument {
 
     /// True if the displacement is an angle in rad; the mass is then a moment of inertia.
     pub fn is_rotation(&self) -> bool {
-        let mass = self.functions.get(CoefficientKind::Mass.name());
-        mass.is_some_and(|mass| mass.unit == CoefficientKind::Mass.angular_unit())
+        let mass = self.functions.get(CoefficientKind::MASS.name());
+        mass.is_some_and(|mass| mass.unit == CoefficientKind::MASS.angular_unit())
     }
 }
 

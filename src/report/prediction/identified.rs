@@ -3,12 +3,12 @@
 use crate::config::{RunSensor, SensorValue};
 use crate::error::InputError;
 use crate::report::Run;
-use crate::report::columns::{kind_named, named_column};
+use crate::report::columns::named_column;
 use crate::report::parameters::{FunctionBasis, ParametersDocument};
 use crate::report::run_reader::at_nodes;
 use crate::units::Unit;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientSet, ScalarParameter, ScalarValue,
+    Basis, CoefficientFunction, CoefficientKind, CoefficientSet, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::record::{ChannelKind, Sensor};
 use kmcfit_core::internals::study::IdentifiedSystem;
@@ -153,7 +153,8 @@ fn function(
     is_known_part: bool,
 ) -> Result<CoefficientFunction, InputError> {
     let grid = &run.system.grid;
-    let kind = kind_named(name).zip(named_column(&stored.name, run.document.is_rotation()));
+    let kind =
+        CoefficientKind::named(name).zip(named_column(&stored.name, run.document.is_rotation()));
     let (quantity, column) = kind.ok_or_else(|| damaged(run, &format!("a function `{name}`")))?;
     let rows = run.functions.finite(&column)?;
     let values = at_nodes(rows, grid.nodes(), run.document.model.steps_per_row);

@@ -1,12 +1,13 @@
 //! Confidence intervals and classification of a fit of the equation error, from the kernel covariance of its scores.
 
 use super::function::EstimateErrors;
+use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Bands, FunctionClassification, classify_functions, condition_on_negligible_noise,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::Experiment;
-use crate::solvers::{EquationPart, Fit, NoEquationRows, Status, equation_balance, equation_rows};
+use crate::solvers::{Fit, NoEquationRows, Status, equation_balance, equation_rows};
 
 /// Reason why a fit of the equation error has no confidence intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +41,7 @@ fn is_driven_unmeasured(problem: &Problem, theta: &[f64]) -> bool {
     let of_damping = balance
         .parts
         .iter()
-        .find(|p| p.part == EquationPart::Damping);
+        .find(|p| p.part == CoefficientKind::DAMPING.name());
     let largest = balance.parts.iter().fold(0.0f64, |most, p| most.max(p.rms));
     of_damping.is_some_and(|damping| damping.residual_share > 1.0)
         && balance.residual_rms > NOISE * largest

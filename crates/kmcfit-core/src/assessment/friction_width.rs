@@ -38,7 +38,7 @@ pub(super) fn width_warning(
     let in_errors = shifts.iter().map(|[shift, error]| shift.abs() / error);
     let in_errors: Vec<f64> = in_errors.collect();
     let is_other =
-        |j: usize| function_of(j).is_none_or(|f| f.quantity != CoefficientKind::CoulombFriction);
+        |j: usize| function_of(j).is_none_or(|f| f.quantity != CoefficientKind::COULOMB_FRICTION);
     let others = (0..shifts.len()).filter(|j| is_other(*j) && in_errors[*j].is_finite());
     let worst = others.max_by(|a, b| in_errors[*a].total_cmp(&in_errors[*b]))?;
     let (estimate, unit) = match function_of(worst) {

@@ -51,14 +51,14 @@ pub(super) fn input_pulses(
     let (quantity, signal) = measured(experiment)?;
     let is_force = quantity == InputQuantity::Force && experiment.input_error.is_none();
     let mut kinds = problem.functions.iter().map(|f| f.quantity);
-    let has_static_force = kinds.any(|kind| kind == CoefficientKind::Offset);
+    let has_static_force = kinds.any(|kind| kind == CoefficientKind::STATIC_FORCE);
     let nodes = problem.functions.nodes();
     let count = problem.sample_count();
     let is_short = nodes.saturating_mul(count) <= MOST_DERIVATIVES;
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     (is_force && !has_static_force && is_short && is_few).then_some(())?;
     applies(problem, theta, evaluation).then_some(())?;
-    let pulses = CoefficientFunction::nodal(CoefficientKind::Offset, vec![0.0; nodes]);
+    let pulses = CoefficientFunction::nodal(CoefficientKind::STATIC_FORCE, vec![0.0; nodes]);
     let (extended, at) = extended(problem, theta, vec![(pulses, Law::Offset)])?;
     let evaluation = extended.evaluate(&at).ok()?;
     let jacobian = weighted_jacobian(&extended, &evaluation);

@@ -253,9 +253,9 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     let mut warnings = Vec::new();
     let sizes = problem.natural_scales(evaluation);
     let passive = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let values = problem
         .functions

@@ -182,7 +182,7 @@ fn is_reversed(problem: &Problem, evaluation: &Evaluation, e: usize) -> bool {
         .iter()
         .map(|f| problem.functions.get(*f).quantity)
         .zip(values);
-    let is_passive = [CoefficientKind::Mass, CoefficientKind::Stiffness];
+    let is_passive = [CoefficientKind::MASS, CoefficientKind::STIFFNESS];
     let is_negative =
         |values: &[f64]| 2 * values.iter().filter(|v| **v < 0.0).count() > values.len();
     !experiment.is_free()

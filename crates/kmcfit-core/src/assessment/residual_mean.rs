@@ -36,7 +36,7 @@ pub(super) fn mean_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<F
             .coefficient_set(experiment.coefficient_set);
         let mut functions = set.iter().map(|f| problem.functions.get(*f));
         let has_force =
-            functions.any(|f| f.quantity == CoefficientKind::Offset && f.parameters() > 0);
+            functions.any(|f| f.quantity == CoefficientKind::STATIC_FORCE && f.parameters() > 0);
         for (channel, predicted) in experiment.channels.iter().zip(predictions) {
             let is_open = channel.sensor().offset.index().is_none();
             if !(is_open && channel.weighting().is_sigma() && channel.filter().is_empty()) {

@@ -51,12 +51,12 @@ const ITERATIONS: u64 = 30;
 const SAMPLES_PER_PARAMETER: usize = 4;
 
 const STIFFNESS: [CoefficientKind; 2] = [
-    CoefficientKind::CubicStiffness,
-    CoefficientKind::QuinticStiffness,
+    CoefficientKind::CUBIC_STIFFNESS,
+    CoefficientKind::QUINTIC_STIFFNESS,
 ];
 const DAMPING: [CoefficientKind; 2] = [
-    CoefficientKind::QuadraticDamping,
-    CoefficientKind::CoulombFriction,
+    CoefficientKind::QUADRATIC_DAMPING,
+    CoefficientKind::COULOMB_FRICTION,
 ];
 
 /// A model with constants that explains the samples as well as coefficients that vary with time.
@@ -262,7 +262,7 @@ pub(super) fn fit_of_constants(
 /// True if a rival has no better minimum far from the fit. One with friction, which ends a motion, may have: it was better by 100 where the response
 /// at the linearised minimum confirmed that it is worse by 500.
 fn is_near(kinds: &[CoefficientKind]) -> bool {
-    !kinds.contains(&CoefficientKind::CoulombFriction)
+    !kinds.contains(&CoefficientKind::COULOMB_FRICTION)
 }
 
 /// Terms of all rivals that the model does not have.
@@ -270,7 +270,7 @@ fn terms(problem: &Problem, response: &Response) -> Vec<(CoefficientKind, Law)> 
     let width = WIDTH * response.speed;
     let all = [STIFFNESS, DAMPING].map(|kinds| absent(problem, kinds));
     let all = all.into_iter().flatten();
-    all.filter_map(|kind| Some((kind, kind.term(width)?)))
+    all.filter_map(|kind| Some((kind, kind.law(width)?)))
         .collect()
 }
 
@@ -335,7 +335,7 @@ fn first_terms(problem: &Problem, indices: &[usize]) -> Vec<Vec<CoefficientKind>
     };
     let [stiffness, damping] = [STIFFNESS, DAMPING].map(|kinds| absent(problem, kinds));
     let single = |kinds: &[CoefficientKind]| kinds.iter().map(|kind| vec![*kind]).collect();
-    match [CoefficientKind::Stiffness, CoefficientKind::Damping].map(varies) {
+    match [CoefficientKind::STIFFNESS, CoefficientKind::DAMPING].map(varies) {
         [true, true] => {
             let pairs = stiffness
                 .iter()
@@ -402,10 +402,10 @@ impl Response {
     fn equivalent(&self, kind: CoefficientKind, a: f64) -> f64 {
         let (a, w) = (a.max(f64::MIN_POSITIVE), self.frequency);
         match kind {
-            CoefficientKind::CubicStiffness => 0.75 * a * a,
-            CoefficientKind::QuinticStiffness => 0.625 * a.powi(4),
-            CoefficientKind::QuadraticDamping => 8.0 / (3.0 * PI) * w * a,
-            CoefficientKind::CoulombFriction => 4.0 / (PI * w * a),
+            CoefficientKind::CUBIC_STIFFNESS => 0.75 * a * a,
+            CoefficientKind::QUINTIC_STIFFNESS => 0.625 * a.powi(4),
+            CoefficientKind::QUADRATIC_DAMPING => 8.0 / (3.0 * PI) * w * a,
+            CoefficientKind::COULOMB_FRICTION => 4.0 / (PI * w * a),
             _ => 0.0,
         }
     }
@@ -449,8 +449,8 @@ fn rival(
     let values = functions.values(theta);
     let of_kind = |own: CoefficientKind| {
         let list = match own {
-            CoefficientKind::Stiffness => &STIFFNESS,
-            CoefficientKind::Damping => &DAMPING,
+            CoefficientKind::STIFFNESS => &STIFFNESS,
+            CoefficientKind::DAMPING => &DAMPING,
             _ => return None,
         };
         kinds.iter().copied().find(|kind| list.contains(kind))
@@ -478,7 +478,7 @@ fn rival(
     }
     let first = list.len();
     let width = WIDTH * response.speed;
-    let terms: Vec<Law> = kinds.iter().filter_map(|kind| kind.term(width)).collect();
+    let terms: Vec<Law> = kinds.iter().filter_map(|kind| kind.law(width)).collect();
     let more = kinds.iter().zip(&new);
     list.extend(more.map(|(kind, start)| CoefficientFunction::constant(*kind, *start, nodes)));
     start.extend(&new);

@@ -201,7 +201,7 @@ fn most_significant(
                     value,
                     t,
                     share: size / largest_force(problem, evaluation),
-                    width: term.friction_width(),
+                    width: term.width(),
                 };
                 let Some(refit) = refit(problem, theta, &missing) else {
                     continue;
@@ -262,8 +262,8 @@ fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKin
     };
     let kinds = TESTED_TERMS.into_iter().filter(|kind| !has(*kind));
     // A static force is a mean of the residuals, which has a test of its own.
-    let kinds = kinds.filter(|kind| *kind != CoefficientKind::Offset);
-    let kinds = kinds.filter_map(|kind| Some((kind, kind.term(width)?)));
+    let kinds = kinds.filter(|kind| *kind != CoefficientKind::STATIC_FORCE);
+    let kinds = kinds.filter_map(|kind| Some((kind, kind.law(width)?)));
     kinds.filter(|_| width > 0.0 && width.is_finite()).collect()
 }
 

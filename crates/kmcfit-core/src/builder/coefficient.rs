@@ -224,7 +224,7 @@ impl CoefficientSpec {
         self
     }
 
-    /// Smoothing speed of the sign of the velocity (m/s), for Coulomb friction only.
+    /// Width of the law, for laws that have one: the smoothing speed (m/s) of Coulomb friction.
     #[must_use]
     pub fn width(mut self, width: f64) -> Self {
         self.width = Some(width);
@@ -426,7 +426,7 @@ fn check_values(kind: CoefficientKind, key: &str, values: &[f64]) -> Result<(), 
             .expected("finite numbers"));
     }
     match values.iter().position(|m| *m <= 0.0) {
-        Some(i) if kind == CoefficientKind::Mass => Err(BuildError::new(
+        Some(i) if kind == CoefficientKind::MASS => Err(BuildError::new(
             key,
             "the mass must be positive at all times",
         )

@@ -18,30 +18,24 @@ pub(super) struct FunctionEntry<'a> {
 }
 
 impl FunctionEntry<'_> {
-    /// Smoothing speed of the sign of the velocity, m/s, for Coulomb friction; 0 for other kinds.
+    /// Width of the law of the coefficient; 0 for laws without one.
     pub fn width(&self) -> Result<f64, BuildError> {
         let key = format!("{}.width", self.key);
-        let advice = "well below those of the response";
-        match (self.kind, self.spec.width) {
-            (CoefficientKind::CoulombFriction, Some(width)) if width > 0.0 && width.is_finite() => {
-                Ok(width)
-            }
-            (CoefficientKind::CoulombFriction, Some(width)) => {
-                Err(BuildError::new(key, "the width must be positive")
-                    .found(width)
-                    .expected(format!("a speed in m/s, greater than 0, {advice}")))
-            }
-            (CoefficientKind::CoulombFriction, None) => {
-                Err(
-                    BuildError::new(&self.key, "Coulomb friction needs a width").expected(format!(
-                        "`width`: the speed in m/s over which the sign of v is smoothed, {advice}"
-                    )),
-                )
-            }
-            (_, Some(width)) => Err(BuildError::new(key, "only Coulomb friction has a width")
+        let row = self.kind.row();
+        match (row.width, self.spec.width) {
+            (Some(_), Some(width)) if width > 0.0 && width.is_finite() => Ok(width),
+            (Some(meaning), Some(width)) => Err(BuildError::new(key, "the width must be positive")
+                .found(width)
+                .expected(format!("greater than 0: {meaning}"))),
+            (Some(meaning), None) => Err(BuildError::new(
+                &self.key,
+                format!("{} needs a width", row.words),
+            )
+            .expected(format!("`width`: {meaning}"))),
+            (None, Some(width)) => Err(BuildError::new(key, format!("{} has no width", row.words))
                 .found(width)
                 .expected("no `width`")),
-            (_, None) => Ok(0.0),
+            (None, None) => Ok(0.0),
         }
     }
 }
@@ -194,7 +188,7 @@ impl Builder {
                     )),
             );
         };
-        if entry.kind != CoefficientKind::CoulombFriction {
+        if entry.kind != CoefficientKind::COULOMB_FRICTION {
             return entry.width().map(|_| place);
         }
         let shared = self.coefficients[place].1.width;

@@ -84,7 +84,7 @@ impl Builder {
         if let Constraint::Bounds { of, min, max } = &constraint.statement {
             uncrossed(key, of.unit(), min.as_ref(), max.as_ref(), &grid)?;
             let lowest = min.as_ref().map(TimeHistory::least);
-            if *of == CoefficientKind::Mass && lowest.is_some_and(|least| least <= 0.0) {
+            if *of == CoefficientKind::MASS && lowest.is_some_and(|least| least <= 0.0) {
                 notices.push(BuildNotice::MassMayVanish { key: key.clone() });
             }
         }
@@ -113,16 +113,16 @@ impl Builder {
         let what = match &constraint.statement {
             Constraint::Passive => "passivity",
             Constraint::Shape {
-                of: CoefficientKind::Mass,
+                of: CoefficientKind::MASS,
                 shape: Shape::NonIncreasing | Shape::NonDecreasing,
             } => "a monotone mass",
             Constraint::Shape {
-                of: CoefficientKind::Stiffness,
+                of: CoefficientKind::STIFFNESS,
                 shape: Shape::NonIncreasing | Shape::NonDecreasing,
             } => "a monotone stiffness",
-            Constraint::Slope { of, min, max } if one_way(*min, *max) => match of {
-                CoefficientKind::Mass => "a slope of the mass in one direction",
-                CoefficientKind::Stiffness => "a slope of the stiffness in one direction",
+            Constraint::Slope { of, min, max } if one_way(*min, *max) => match *of {
+                CoefficientKind::MASS => "a slope of the mass in one direction",
+                CoefficientKind::STIFFNESS => "a slope of the stiffness in one direction",
                 _ => return None,
             },
             _ => return None,
@@ -180,21 +180,21 @@ impl ConstraintSpec {
         }
         let held = match &self.statement {
             Constraint::Bounds {
-                of: CoefficientKind::Mass,
+                of: CoefficientKind::MASS,
                 max: Some(max),
                 ..
             } => max.least(),
             Constraint::Value {
-                of: CoefficientKind::Mass,
+                of: CoefficientKind::MASS,
                 value,
                 ..
             }
             | Constraint::Mean {
-                of: CoefficientKind::Mass,
+                of: CoefficientKind::MASS,
                 value,
             }
             | Constraint::Integral {
-                of: CoefficientKind::Mass,
+                of: CoefficientKind::MASS,
                 value,
             } => *value,
             _ => return Ok(()),

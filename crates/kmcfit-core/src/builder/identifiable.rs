@@ -15,7 +15,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     // With an estimated stiffness a shifted quadratic spring is another quadratic spring.
     let mut functions = problem.functions.iter();
     let has_stiffness =
-        functions.any(|f| f.quantity == CoefficientKind::Stiffness && f.parameters() > 0);
+        functions.any(|f| f.quantity == CoefficientKind::STIFFNESS && f.parameters() > 0);
     let shift_is_free = |t: &Law| match t {
         Law::QuadraticStiffness => has_stiffness,
         Law::Offset => true,
@@ -95,7 +95,8 @@ fn check_offsets(
     open: &dyn Fn(Option<usize>) -> bool,
 ) -> Result<(), BuildError> {
     let mut functions = problem.functions.iter();
-    let estimated = functions.any(|f| f.quantity == CoefficientKind::Offset && f.parameters() > 0);
+    let estimated =
+        functions.any(|f| f.quantity == CoefficientKind::STATIC_FORCE && f.parameters() > 0);
     let shifted = |e: &Experiment| {
         let sees =
             |c: &Channel| c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index());

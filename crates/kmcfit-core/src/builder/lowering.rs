@@ -169,7 +169,7 @@ impl Builder {
         let mut terms = Vec::new();
         let is_term = |entry: &&FunctionEntry| entry.owner.is_none() && !entry.is_known_part;
         for entry in self.entries().iter().filter(is_term) {
-            terms.extend(entry.kind.term(entry.width()?));
+            terms.extend(entry.kind.law(entry.width()?));
         }
         Ok(terms)
     }

@@ -23,8 +23,8 @@
 //! let fit = problem.fit()?;
 //!
 //! let estimate = |kind| problem.coefficient(kind, &fit.best.parameters).map(|values| values[0]);
-//! let damping = estimate(CoefficientKind::Damping).expect("the system has damping");
-//! let stiffness = estimate(CoefficientKind::Stiffness).expect("the system has stiffness");
+//! let damping = estimate(CoefficientKind::DAMPING).expect("the system has damping");
+//! let stiffness = estimate(CoefficientKind::STIFFNESS).expect("the system has stiffness");
 //! assert!((damping - 2.0).abs() < 1e-3 && (stiffness - 2500.0).abs() < 1e-2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -105,9 +105,9 @@ impl Builder {
     /// A system with mass (kg), damping (N s/m) and stiffness (N/m), integrated by RK4.
     pub fn new([mass, damping, stiffness]: [CoefficientSpec; 3]) -> Self {
         Self::of(vec![
-            (CoefficientKind::Mass, mass),
-            (CoefficientKind::Damping, damping),
-            (CoefficientKind::Stiffness, stiffness),
+            (CoefficientKind::MASS, mass),
+            (CoefficientKind::DAMPING, damping),
+            (CoefficientKind::STIFFNESS, stiffness),
         ])
     }
 
@@ -129,37 +129,37 @@ impl Builder {
     /// Adds a quadratic stiffness `k2` (N/m^2), the factor of `y^2`: the asymmetric part of a spring.
     #[must_use]
     pub fn quadratic_stiffness(self, spec: CoefficientSpec) -> Self {
-        self.coefficient(CoefficientKind::QuadraticStiffness, spec)
+        self.coefficient(CoefficientKind::QUADRATIC_STIFFNESS, spec)
     }
 
     /// Adds a cubic stiffness `k3` (N/m^3), the factor of `y^3`.
     #[must_use]
     pub fn cubic_stiffness(self, spec: CoefficientSpec) -> Self {
-        self.coefficient(CoefficientKind::CubicStiffness, spec)
+        self.coefficient(CoefficientKind::CUBIC_STIFFNESS, spec)
     }
 
     /// Adds a quintic stiffness `k5` (N/m^5), the factor of `y^5`.
     #[must_use]
     pub fn quintic_stiffness(self, spec: CoefficientSpec) -> Self {
-        self.coefficient(CoefficientKind::QuinticStiffness, spec)
+        self.coefficient(CoefficientKind::QUINTIC_STIFFNESS, spec)
     }
 
     /// Adds a quadratic damping (N s^2/m^2), the factor of `|v| v`.
     #[must_use]
     pub fn quadratic_damping(self, spec: CoefficientSpec) -> Self {
-        self.coefficient(CoefficientKind::QuadraticDamping, spec)
+        self.coefficient(CoefficientKind::QUADRATIC_DAMPING, spec)
     }
 
     /// Adds Coulomb friction (N), the factor of `v / sqrt(v^2 + width^2)`, `width` in m/s.
     #[must_use]
     pub fn coulomb_friction(self, spec: CoefficientSpec, width: f64) -> Self {
-        self.coefficient(CoefficientKind::CoulombFriction, spec.width(width))
+        self.coefficient(CoefficientKind::COULOMB_FRICTION, spec.width(width))
     }
 
     /// Adds a static force (N), positive against the direction of `y`.
     #[must_use]
     pub fn offset(self, spec: CoefficientSpec) -> Self {
-        self.coefficient(CoefficientKind::Offset, spec)
+        self.coefficient(CoefficientKind::STATIC_FORCE, spec)
     }
 
     /// Sets a coefficient function; replaces an earlier one of its kind.

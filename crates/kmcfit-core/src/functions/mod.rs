@@ -5,7 +5,6 @@
 //! trapezoid weights `W`.
 
 pub mod basis;
-mod coefficient_kind;
 mod coefficient_set;
 mod design;
 mod gram;
@@ -16,8 +15,8 @@ mod ratios;
 mod scalar;
 mod total_variation;
 
+pub use crate::structure::CoefficientKind;
 pub use basis::Basis;
-pub use coefficient_kind::CoefficientKind;
 pub use coefficient_set::CoefficientSet;
 pub use design::Design;
 pub use gram::Gram;

@@ -97,7 +97,7 @@ mod tests {
         let parabola: Vec<f64> = grid.times().iter().map(|t| 1.0 + 0.5 * t * t).collect();
         let theta = basis.project(&grid, &parabola).unwrap();
         let start = vec![0.0; theta.len()];
-        let function = CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, start);
+        let function = CoefficientFunction::free(CoefficientKind::STIFFNESS, basis, &grid, start);
         let found = error_of(&function, &theta, &grid.times());
         let fitted = function.design.multiply(&theta, grid.nodes());
         for i in 2000..2800 {
@@ -134,7 +134,7 @@ mod tests {
         let grid = Grid::new(0.0, 1.0, 11).unwrap();
         let knots = vec![0.0, 0.25, 1.0];
         let basis = Basis::PiecewiseLinear { knots };
-        let kind = CoefficientKind::Stiffness;
+        let kind = CoefficientKind::STIFFNESS;
         let line = CoefficientFunction::free(kind, basis, &grid, vec![1.0, 1.5, 3.0]);
         assert_eq!(error_of(&line, &line.start, &grid.times()), vec![0.0; 11]);
         let constant = CoefficientFunction::constant(kind, 1.0, 11);

@@ -166,9 +166,9 @@ mod tests {
         let basis = Basis::PiecewiseLinear { knots };
         let stiffness = vec![3.0, 8.0, 5.0];
         let list = vec![
-            CoefficientFunction::constant(CoefficientKind::Mass, 1.3, NODES),
-            CoefficientFunction::constant(CoefficientKind::Damping, 0.2, NODES),
-            CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, stiffness),
+            CoefficientFunction::constant(CoefficientKind::MASS, 1.3, NODES),
+            CoefficientFunction::constant(CoefficientKind::DAMPING, 0.2, NODES),
+            CoefficientFunction::free(CoefficientKind::STIFFNESS, basis, &grid, stiffness),
         ];
         let functions = Parameterization::new(list, NODES, grid.step()).expect("functions");
         let times: Vec<f64> = (0..=40).map(|i| 0.5 + 0.25 * f64::from(i)).collect();

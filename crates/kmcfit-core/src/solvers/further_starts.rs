@@ -162,7 +162,7 @@ fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
         let function = functions.get(f);
         let is_wanted = matches!(
             function.quantity,
-            CoefficientKind::Mass | CoefficientKind::Stiffness
+            CoefficientKind::MASS | CoefficientKind::STIFFNESS
         );
         let median = median(&*values);
         let range = median / OUTLYING..=median * OUTLYING;

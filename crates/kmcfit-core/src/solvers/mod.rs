@@ -53,8 +53,8 @@ pub(crate) use linearization::{
 };
 pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{
-    EquationBalance, EquationForm, EquationPart, EquationShare, MissingTerm, NoEquationRows,
-    equation_balance, equation_error, equation_rows, missing_terms,
+    EquationBalance, EquationForm, EquationShare, MissingTerm, NoEquationRows, equation_balance,
+    equation_error, equation_rows, missing_terms,
 };
 pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};

@@ -6,7 +6,7 @@ use super::response::{Linear, Prepared, in_paper_order, respond};
 use super::stage::{Drive, Function, Model, Quotient, Values};
 use super::tableau::{At, MIDPOINT, RK4, Tableau};
 use crate::simd::{self, Arithmetic, Kernel, LANES, Real};
-use crate::structure::{Law, Link};
+use crate::structure::{CoefficientKind, Law, Link};
 use num_dual::{Dual64, DualNum};
 use std::array::from_fn;
 
@@ -52,15 +52,15 @@ impl<const N: usize> Structure<N> {
             elements.push(element(Law::Damping, j, j.checked_sub(1)));
             elements.push(element(Law::Stiffness, j, j.checked_sub(1)));
         }
-        let laws = [
-            Law::CubicStiffness,
-            Law::QuadraticDamping,
-            Law::CoulombFriction { width: 0.1 },
-            Law::Offset,
-            Law::QuadraticStiffness,
-            Law::QuinticStiffness,
+        let further = [
+            CoefficientKind::CUBIC_STIFFNESS,
+            CoefficientKind::QUADRATIC_DAMPING,
         ];
-        for (e, law) in laws.into_iter().enumerate().take(others) {
+        let laws = further
+            .into_iter()
+            .chain(CoefficientKind::ALL.into_iter().skip(5));
+        let laws = laws.filter_map(|kind| kind.law(0.1));
+        for (e, law) in laws.enumerate().take(others) {
             let to = (N > 1 && e % 2 == 0).then_some((e + 1) % N);
             let from = e % N;
             elements.push(element(law, from, to.filter(|to| *to != from)));

@@ -6,7 +6,7 @@ use super::tangents::{ConstantPerturbation, Slot, TILE, Tangents};
 use super::{CoefficientGradient, EngineMode, SearchRay, Trajectory, least_squares, observe};
 use crate::record::ChannelKind;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
-use crate::structure::{Law, Structure};
+use crate::structure::{CoefficientKind, Law, Structure};
 use crate::system::quadrature::trapezoid;
 use crate::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
@@ -90,16 +90,10 @@ fn terms() -> impl Strategy<Value = Vec<Law>> {
     let linear = vec![Law::Damping, Law::Stiffness];
     let duffing = vec![Law::Damping, Law::Stiffness, Law::CubicStiffness];
     let all = (0.05..0.5f64).prop_map(|width| {
-        vec![
-            Law::Damping,
-            Law::Stiffness,
-            Law::QuadraticStiffness,
-            Law::CubicStiffness,
-            Law::QuinticStiffness,
-            Law::QuadraticDamping,
-            Law::CoulombFriction { width },
-            Law::Offset,
-        ]
+        let kinds = CoefficientKind::ALL.into_iter();
+        kinds
+            .filter_map(|kind| kind.law(width))
+            .collect::<Vec<Law>>()
     });
     // With the mass eight functions, one for each direction of a group of sensitivities.
     let some = all

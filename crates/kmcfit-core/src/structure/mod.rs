@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `law` | forces of elements and their slopes: a new element is a variant of [`Law`] |
+//! | `elements` | the table of coefficients with names and units, and the laws of their elements: a new element is added here |
 //! | `hysteresis` | elements with an internal state and several coefficients |
 //! | `ends` | rows `b`: how an elongation follows from coordinates and supports |
 //! | `assembly` | a structure of any size, its table of inertias and elements, its natural frequencies |
@@ -11,13 +11,13 @@
 
 mod assembly;
 pub(crate) mod banded;
+mod elements;
 mod ends;
 mod hysteresis;
-mod law;
 mod link;
 
 pub use assembly::{Structure, StructureError};
+pub use elements::{CoefficientKind, CoefficientRow, Law, MOST_ELEMENTS};
 pub use ends::Ends;
 pub(crate) use hysteresis::Partials;
-pub use law::{Law, MOST_ELEMENTS};
 pub(crate) use link::Link;

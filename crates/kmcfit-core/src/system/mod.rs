@@ -40,7 +40,10 @@ impl System {
 
     /// Width of Coulomb friction, m/s; `None` without it.
     pub fn friction_width(&self) -> Option<f64> {
-        self.laws().iter().find_map(Law::friction_width)
+        self.laws().iter().find_map(|law| match law {
+            Law::CoulombFriction { width } => Some(*width),
+            _ => None,
+        })
     }
 
     /// True if the response is linear in the initial state and there is no excitation.

@@ -54,9 +54,9 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
         .displacement(0)
         .to_vec();
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let list = quantities
         .into_iter()

@@ -70,6 +70,7 @@ impl Truth<'_> {
     }
 }
 
+#[allow(clippy::match_wildcard_for_single_variants, reason = "of a law that is added, too")]
 fn response(term: Law) -> Response {
     match term {
         Law::Damping => Response::Damping,
@@ -80,7 +81,7 @@ fn response(term: Law) -> Response {
         Law::QuadraticDamping => Response::Quadratic,
         Law::CoulombFriction { width } => Response::Coulomb(width),
         Law::Offset => Response::Offset,
-        Law::BoucWen { .. } => unreachable!("an internal state"),
+        other => unreachable!("{other:?} is not in the independent integrator"),
     }
 }
 

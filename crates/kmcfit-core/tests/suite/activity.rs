@@ -22,9 +22,9 @@ fn capped(cap: f64) -> Problem {
     };
     let observed = system.forward(&truth, &common::initial(), None).unwrap();
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, vec![1.0; NODES]),
     ];
     let mut problem = common::problem_of(system, list, observed.displacement(0).to_vec(), None);
     let statement = Constraint::DampingRatio { max: cap };
@@ -137,9 +137,9 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
 fn with_sum_below(cap: f64) -> Problem {
     let mut problem = capped(0.2);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.4, NODES),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 0.4, NODES),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.4, NODES),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 0.4, NODES),
     ];
     problem = problem
         .with(|parts| {

@@ -22,38 +22,38 @@ use std::sync::Arc;
 
 const WIDTH: f64 = 0.3;
 const TERMS: [(Response, Law, CoefficientKind); 8] = [
-    (Response::Damping, Law::Damping, CoefficientKind::Damping),
+    (Response::Damping, Law::Damping, CoefficientKind::DAMPING),
     (
         Response::Stiffness,
         Law::Stiffness,
-        CoefficientKind::Stiffness,
+        CoefficientKind::STIFFNESS,
     ),
     (
         Response::QuadraticSpring,
         Law::QuadraticStiffness,
-        CoefficientKind::QuadraticStiffness,
+        CoefficientKind::QUADRATIC_STIFFNESS,
     ),
     (
         Response::Quintic,
         Law::QuinticStiffness,
-        CoefficientKind::QuinticStiffness,
+        CoefficientKind::QUINTIC_STIFFNESS,
     ),
     (
         Response::Cubic,
         Law::CubicStiffness,
-        CoefficientKind::CubicStiffness,
+        CoefficientKind::CUBIC_STIFFNESS,
     ),
     (
         Response::Quadratic,
         Law::QuadraticDamping,
-        CoefficientKind::QuadraticDamping,
+        CoefficientKind::QUADRATIC_DAMPING,
     ),
     (
         Response::Coulomb(WIDTH),
         Law::CoulombFriction { width: WIDTH },
-        CoefficientKind::CoulombFriction,
+        CoefficientKind::COULOMB_FRICTION,
     ),
-    (Response::Offset, Law::Offset, CoefficientKind::Offset),
+    (Response::Offset, Law::Offset, CoefficientKind::STATIC_FORCE),
 ];
 const LOSSES: [Loss; 3] = [
     Loss::Squares,
@@ -182,7 +182,7 @@ impl Case {
         let nodes = self.nodes();
         let grid = Grid::new(0.0, self.dt * (nodes - 1) as f64, nodes).unwrap();
         let mut list = vec![CoefficientFunction::nodal(
-            CoefficientKind::Mass,
+            CoefficientKind::MASS,
             self.mass.clone(),
         )];
         for ((_, _, quantity), values) in TERMS.iter().zip(&self.coefficients) {

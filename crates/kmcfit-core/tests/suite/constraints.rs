@@ -14,9 +14,9 @@ use kmcfit_core::internals::system::{Grid, Method, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const MASS: CoefficientKind = CoefficientKind::Mass;
-const DAMPING: CoefficientKind = CoefficientKind::Damping;
-const STIFFNESS: CoefficientKind = CoefficientKind::Stiffness;
+const MASS: CoefficientKind = CoefficientKind::MASS;
+const DAMPING: CoefficientKind = CoefficientKind::DAMPING;
+const STIFFNESS: CoefficientKind = CoefficientKind::STIFFNESS;
 const NODES: usize = 41;
 
 fn grid() -> Grid {

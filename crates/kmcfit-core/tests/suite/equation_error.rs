@@ -26,13 +26,13 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
     };
     let response = system.forward(&truth, &common::initial(), None).unwrap();
     let damping = match damping {
-        Some(value) => CoefficientFunction::fixed(CoefficientKind::Damping, vec![value; NODES]),
-        None => CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
+        Some(value) => CoefficientFunction::fixed(CoefficientKind::DAMPING, vec![value; NODES]),
+        None => CoefficientFunction::constant(CoefficientKind::DAMPING, 0.5, NODES),
     };
     let list = vec![
-        CoefficientFunction::constant(CoefficientKind::Mass, START, NODES),
+        CoefficientFunction::constant(CoefficientKind::MASS, START, NODES),
         damping,
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 1.0, NODES),
     ];
     let mut problem = common::problem_of(system, list, response.displacement(0).to_vec(), None);
     if silent_force {
@@ -158,9 +158,9 @@ fn cosines() -> Problem {
     let nodes = 504;
     let grid = Grid::new(0.0, 5.03, nodes).unwrap();
     let list = vec![
-        CoefficientFunction::constant(CoefficientKind::Mass, 1.0, nodes),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.5, nodes),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 50.0, nodes),
+        CoefficientFunction::constant(CoefficientKind::MASS, 1.0, nodes),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.5, nodes),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 50.0, nodes),
     ];
     let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
     let record = |(amplitude, period): (f64, f64)| {

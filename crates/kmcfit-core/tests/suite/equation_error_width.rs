@@ -177,5 +177,5 @@ fn a_missing_spring_is_a_spring() {
     assert!(none.is_empty(), "{none:?}");
     let found = springs(&carriage(2, false, |y, _| 30.0 * y));
     let kinds: Vec<CoefficientKind> = found.iter().map(|m| m.term).collect();
-    assert_eq!(kinds, [CoefficientKind::Stiffness]);
+    assert_eq!(kinds, [CoefficientKind::STIFFNESS]);
 }

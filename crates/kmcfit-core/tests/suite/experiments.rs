@@ -16,9 +16,9 @@ use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients
 const NODES: usize = 401;
 const DURATION: f64 = 25.0;
 const QUANTITIES: [CoefficientKind; 3] = [
-    CoefficientKind::Mass,
-    CoefficientKind::Damping,
-    CoefficientKind::Stiffness,
+    CoefficientKind::MASS,
+    CoefficientKind::DAMPING,
+    CoefficientKind::STIFFNESS,
 ];
 fn states() -> [State; 3] {
     [

@@ -91,11 +91,11 @@ impl EstimatedFunction {
 
 /// Damping and stiffness of the linear system, which most tests estimate; the mass is known.
 fn damping() -> EstimatedFunction {
-    constant(CoefficientKind::Damping, 0.25, 0.4)
+    constant(CoefficientKind::DAMPING, 0.25, 0.4)
 }
 
 fn stiffness() -> EstimatedFunction {
-    lines(CoefficientKind::Stiffness, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
+    lines(CoefficientKind::STIFFNESS, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
 }
 
 const LINEAR: [Law; 2] = [Law::Damping, Law::Stiffness];
@@ -299,7 +299,7 @@ impl Case {
         let system = system(&self.terms);
         let mass = match &self.mass {
             Some(estimated) => estimated.function(),
-            None => CoefficientFunction::fixed(CoefficientKind::Mass, known_mass()),
+            None => CoefficientFunction::fixed(CoefficientKind::MASS, known_mass()),
         };
         let mut list = vec![mass];
         list.extend(self.functions.iter().map(EstimatedFunction::function));
@@ -476,7 +476,7 @@ fn a_measured_force_gives_the_mass_too() {
             forced(),
             vec![ChannelSpec::of(kind, scattered(200, 6))],
         )]);
-        case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
+        case.mass = Some(constant(CoefficientKind::MASS, 1.2, 1.6));
         case.check(&format!("forced, {}", kind.name()));
     }
 }
@@ -529,21 +529,21 @@ fn all_together() {
             Law::Offset,
         ],
         mass: Some(lines(
-            CoefficientKind::Mass,
+            CoefficientKind::MASS,
             [1.2, 1.1, 1.15, 1.0, 0.9],
             1.3,
         )),
         functions: vec![
             damping(),
             stiffness(),
-            constant(CoefficientKind::QuadraticStiffness, 0.3, 0.0),
-            constant(CoefficientKind::CubicStiffness, 0.8, 0.5),
-            constant(CoefficientKind::QuinticStiffness, 0.1, 0.0),
-            constant(CoefficientKind::QuadraticDamping, 0.1, 0.0),
-            constant(CoefficientKind::CoulombFriction, 0.2, 0.0),
-            constant(CoefficientKind::Offset, -0.3, 0.0),
+            constant(CoefficientKind::QUADRATIC_STIFFNESS, 0.3, 0.0),
+            constant(CoefficientKind::CUBIC_STIFFNESS, 0.8, 0.5),
+            constant(CoefficientKind::QUINTIC_STIFFNESS, 0.1, 0.0),
+            constant(CoefficientKind::QUADRATIC_DAMPING, 0.1, 0.0),
+            constant(CoefficientKind::COULOMB_FRICTION, 0.2, 0.0),
+            constant(CoefficientKind::STATIC_FORCE, -0.3, 0.0),
         ],
-        own: vec![(2, constant(CoefficientKind::Stiffness, 5.0, 4.2))],
+        own: vec![(2, constant(CoefficientKind::STIFFNESS, 5.0, 4.2))],
         scalars: vec![
             scalar(initial().displacement(0), 1.0, Some(0.1)),
             scalar(initial().velocity(0), -0.2, None),
@@ -579,11 +579,11 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
         terms: vec![Law::Damping, Law::Stiffness, Law::CubicStiffness],
         mass: None,
         functions: vec![
-            nodal(CoefficientKind::Damping, 0.25, 0.01, 0.4),
-            nodal(CoefficientKind::Stiffness, 4.0, 0.05, 3.6),
-            constant(CoefficientKind::CubicStiffness, 0.5, 0.2),
+            nodal(CoefficientKind::DAMPING, 0.25, 0.01, 0.4),
+            nodal(CoefficientKind::STIFFNESS, 4.0, 0.05, 3.6),
+            constant(CoefficientKind::CUBIC_STIFFNESS, 0.5, 0.2),
         ],
-        own: vec![(2, nodal(CoefficientKind::Stiffness, 5.0, -0.03, 4.5))],
+        own: vec![(2, nodal(CoefficientKind::STIFFNESS, 5.0, -0.03, 4.5))],
         scalars: vec![
             scalar(initial().displacement(0), 1.0, None),
             scalar(initial().velocity(0), -0.2, None),

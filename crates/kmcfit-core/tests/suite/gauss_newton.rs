@@ -51,9 +51,9 @@ fn problem(units: Units) -> Problem {
         .map(|y| units.length * y)
         .collect();
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.inertias[0].clone()),
-        CoefficientFunction::fixed(CoefficientKind::Damping, nodal.coefficients[0].clone()),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, nodal.coefficients[1].clone()),
+        CoefficientFunction::fixed(CoefficientKind::MASS, nodal.inertias[0].clone()),
+        CoefficientFunction::fixed(CoefficientKind::DAMPING, nodal.coefficients[0].clone()),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, nodal.coefficients[1].clone()),
     ];
     let sigma = units.length * units.sigma;
     let mut problem = common::problem_of(system, list, observed, Some(sigma));

@@ -20,9 +20,9 @@ use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients
 use proptest::prelude::*;
 
 const QUANTITIES: [CoefficientKind; 3] = [
-    CoefficientKind::Mass,
-    CoefficientKind::Damping,
-    CoefficientKind::Stiffness,
+    CoefficientKind::MASS,
+    CoefficientKind::DAMPING,
+    CoefficientKind::STIFFNESS,
 ];
 fn states() -> [State; 3] {
     [
@@ -95,9 +95,9 @@ fn linear_mass(system: &System, record: Record) -> Problem {
     };
     let start = degree_1.project(&grid, &mass).unwrap();
     let list = vec![
-        CoefficientFunction::free(CoefficientKind::Mass, degree_1, &grid, start),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
+        CoefficientFunction::free(CoefficientKind::MASS, degree_1, &grid, start),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.05, nodes),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 1.0, nodes),
     ];
     with_records(system, list, &nodal, &[record])
 }
@@ -356,9 +356,9 @@ fn bands_of_a_linear_mass_cover_the_truth() {
     let degree_1 = Basis::Polynomial { degree: 1 };
     let start = degree_1.project(&grid, &truth.inertias[0]).unwrap();
     let list = vec![
-        CoefficientFunction::free(CoefficientKind::Mass, degree_1, &grid, start),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.02, 500),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; 500]),
+        CoefficientFunction::free(CoefficientKind::MASS, degree_1, &grid, start),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.02, 500),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, vec![1.0; 500]),
     ];
     coverage(
         &with_records(&system, list, &truth, &[free(0)]),
@@ -386,9 +386,9 @@ fn bands_of_functions_on_knots_cover_the_truth() {
     };
     let [m, c] = starts;
     let list = vec![
-        CoefficientFunction::free(CoefficientKind::Mass, mass.clone(), &grid, m),
-        CoefficientFunction::free(CoefficientKind::Damping, damping.clone(), &grid, c),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; 500]),
+        CoefficientFunction::free(CoefficientKind::MASS, mass.clone(), &grid, m),
+        CoefficientFunction::free(CoefficientKind::DAMPING, damping.clone(), &grid, c),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, vec![1.0; 500]),
     ];
     let mut problem = with_records(&system, list, &truth, &[free(0)]);
     // So light that the bias is a small part of the standard error: sandwich bands leave it out.
@@ -478,9 +478,9 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.inertias[0].clone()),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.0, nodes),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
+        CoefficientFunction::fixed(CoefficientKind::MASS, nodal.inertias[0].clone()),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.0, nodes),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 1.0, nodes),
     ];
     let mut problem = with_records(&system, list, &nodal, &[free(0)]);
     let theta = problem.start();

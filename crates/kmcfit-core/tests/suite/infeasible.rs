@@ -27,9 +27,9 @@ fn problem(basis: &Basis) -> Problem {
     let response = system.forward(&truth, &common::initial(), None).unwrap();
     let start = basis.constant(&grid, 1.0);
     let list = vec![
-        CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, start),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::free(CoefficientKind::MASS, basis.clone(), &grid, start),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, vec![1.0; NODES]),
     ];
     common::problem_of(system, list, response.displacement(0).to_vec(), None)
 }

@@ -34,10 +34,10 @@ fn problem() -> (Problem, Vec<f64>) {
         .collect();
     let basis = Basis::PiecewiseConstant { knots };
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, nodes),
         CoefficientFunction::free(
-            CoefficientKind::Stiffness,
+            CoefficientKind::STIFFNESS,
             basis.clone(),
             &grid,
             vec![1.8; KNOTS - 1],

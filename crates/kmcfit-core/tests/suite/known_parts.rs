@@ -81,8 +81,8 @@ fn carriage(samples: usize) -> Builder {
         CoefficientSpec::uncertain(1.5, 0.2),
         CoefficientSpec::constant(700.0).known_part(CoefficientSpec::fixed(50.0)),
     ])
-    .record(record("bare", 0.3).coefficient(CoefficientKind::Mass, part(known)))
-    .record(record("block", 1.4).coefficient(CoefficientKind::Mass, part(block)))
+    .record(record("bare", 0.3).coefficient(CoefficientKind::MASS, part(known)))
+    .record(record("block", 1.4).coefficient(CoefficientKind::MASS, part(block)))
 }
 
 /// A parameter vector away from the start, priors and their known values.
@@ -122,7 +122,7 @@ fn coefficients_are_sums() {
     *at.last_mut().unwrap() += 0.05;
     assert!((problem.regularisation(&at) - 1.0).abs() < 1e-12);
     // The shared coefficients include the known part.
-    let stiffness = problem.coefficient(CoefficientKind::Stiffness, &theta);
+    let stiffness = problem.coefficient(CoefficientKind::STIFFNESS, &theta);
     assert!((stiffness.unwrap()[7] - 750.0).abs() < 1e-12);
 }
 
@@ -245,7 +245,7 @@ fn weighed(seed: u64) -> Problem {
         let part = CoefficientSpec::uncertain(block + sigma * error, sigma);
         let own = CoefficientSpec::shared().known_part(part);
         let record = record(i + 1, &format!("block {}", i + 1), block);
-        builder = builder.record(record.coefficient(CoefficientKind::Mass, own));
+        builder = builder.record(record.coefficient(CoefficientKind::MASS, own));
     }
     builder.build().unwrap()
 }

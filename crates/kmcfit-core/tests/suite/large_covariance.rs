@@ -84,7 +84,7 @@ fn standard_errors_are_those_of_dense_decompositions() {
     let given = PenaltyWeight::Given(0.02);
     let rule = PenaltyWeight::Rule(WeightRule::RestrictedLikelihood);
     let start = Constraint::Value {
-        of: CoefficientKind::Stiffness,
+        of: CoefficientKind::STIFFNESS,
         at: 0.0,
         value: 60.0,
     };

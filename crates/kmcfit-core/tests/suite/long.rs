@@ -83,10 +83,10 @@ fn problem(
     let mut experiment = Experiment::free("free", initial(), NODES).with_channel(channel.unwrap());
     let middle = truth.coefficients[1][NODES / 2];
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; NODES]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, NODES),
         CoefficientFunction::free(
-            CoefficientKind::Stiffness,
+            CoefficientKind::STIFFNESS,
             basis.clone(),
             &grid,
             basis.constant(&grid, factor * middle),

@@ -12,10 +12,10 @@ const MASS: f64 = 2.0;
 const STIFFNESS: f64 = TAU * TAU * MASS;
 const SAMPLES: usize = 3000;
 const KINDS: [CoefficientKind; 4] = [
-    CoefficientKind::Offset,
-    CoefficientKind::CoulombFriction,
-    CoefficientKind::QuadraticDamping,
-    CoefficientKind::CubicStiffness,
+    CoefficientKind::STATIC_FORCE,
+    CoefficientKind::COULOMB_FRICTION,
+    CoefficientKind::QUADRATIC_DAMPING,
+    CoefficientKind::CUBIC_STIFFNESS,
 ];
 
 /// Terms found missing in the record of a seed, which has `term`; `spacing` in s.
@@ -41,9 +41,9 @@ fn found(seed: u64, term: Option<CoefficientKind>, spacing: f64) -> Vec<MissingT
     let size = 0.02 * STIFFNESS * y;
     let extra = move |at: f64, speed: f64| match term {
         None => 0.0,
-        Some(CoefficientKind::Offset) => size,
-        Some(CoefficientKind::CoulombFriction) => size * (speed / (1e-3 * v)).tanh(),
-        Some(CoefficientKind::QuadraticDamping) => size / (v * v) * speed * speed.abs(),
+        Some(CoefficientKind::STATIC_FORCE) => size,
+        Some(CoefficientKind::COULOMB_FRICTION) => size * (speed / (1e-3 * v)).tanh(),
+        Some(CoefficientKind::QUADRATIC_DAMPING) => size / (v * v) * speed * speed.abs(),
         Some(_) => size / (y * y * y) * at * at * at,
     };
     let states = response(spacing, [0.0, 0.0], &force, |_, y, v, f| {

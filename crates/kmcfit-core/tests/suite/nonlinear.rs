@@ -111,10 +111,10 @@ fn duffing(factors: [f64; 4]) -> Case {
     // 30 to 60 steps in a period of the system, which is 2 to 4 s.
     let system = system(1501, 100.0, &terms);
     let truth = [
-        (CoefficientKind::Mass, 1.0),
-        (CoefficientKind::Damping, 0.2),
-        (CoefficientKind::Stiffness, 2.5),
-        (CoefficientKind::CubicStiffness, 1.2),
+        (CoefficientKind::MASS, 1.0),
+        (CoefficientKind::DAMPING, 0.2),
+        (CoefficientKind::STIFFNESS, 2.5),
+        (CoefficientKind::CUBIC_STIFFNESS, 1.2),
     ];
     let constants = truth.into_iter().zip(factors);
     Case {
@@ -154,9 +154,9 @@ fn stick_slip() -> Case {
     Case {
         excitation: push(&system.grid, |t| 1.5 * (w * t).cos()),
         constants: vec![
-            (CoefficientKind::Mass, 1.0, 2.0),
-            (CoefficientKind::Stiffness, 2.0, 1.0),
-            (CoefficientKind::CoulombFriction, FRICTION, 0.25),
+            (CoefficientKind::MASS, 1.0, 2.0),
+            (CoefficientKind::STIFFNESS, 2.0, 1.0),
+            (CoefficientKind::COULOMB_FRICTION, FRICTION, 0.25),
         ],
         system,
     }
@@ -220,7 +220,7 @@ fn each_record_has_its_own_friction() {
             .channel(channel);
         if i == 1 {
             let own = CoefficientSpec::constant(0.5);
-            record = record.coefficient(CoefficientKind::CoulombFriction, own);
+            record = record.coefficient(CoefficientKind::COULOMB_FRICTION, own);
         }
         builder = builder.record(record);
     }

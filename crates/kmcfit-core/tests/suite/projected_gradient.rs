@@ -26,9 +26,9 @@ fn problem(sigma: f64) -> Problem {
     let response = system.forward(&nodal, &common::initial(), None).unwrap();
     let observed = with_noise(response.displacement(0), 1.0, 7);
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let list = quantities.into_iter().zip(values);
     let list = list.map(|(q, values)| CoefficientFunction::fixed(q, values));

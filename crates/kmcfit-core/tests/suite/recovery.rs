@@ -43,13 +43,13 @@ fn linear_mass(system: System, observed: Vec<f64>, sigma: Option<f64>) -> Proble
     let degree_1 = Basis::Polynomial { degree: 1 };
     let list = vec![
         CoefficientFunction::free(
-            CoefficientKind::Mass,
+            CoefficientKind::MASS,
             degree_1.clone(),
             &grid,
             degree_1.constant(&grid, 2.0),
         ),
-        CoefficientFunction::constant(CoefficientKind::Damping, 1.0, grid.nodes()),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; grid.nodes()]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 1.0, grid.nodes()),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, vec![1.0; grid.nodes()]),
     ];
     common::problem_of(system, list, observed, sigma)
 }
@@ -80,9 +80,9 @@ fn knots_recover_all_three_functions_to_1e_6() {
         knots: uniform_knots(&grid, 11),
     };
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let list = quantities
         .into_iter()
@@ -101,9 +101,9 @@ fn knots_recover_all_three_functions_to_1e_6() {
 fn smooth_nodal(nodes: usize) -> (Problem, NodalCoefficients) {
     let (system, truth, observed) = paper_data(nodes);
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let list = quantities
         .into_iter()
@@ -245,9 +245,9 @@ fn positivity_alone_does_not_recover_the_system() {
     let (system, truth, observed) = paper_data(2000);
     let nodes = system.grid.nodes();
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let list = quantities
         .into_iter()

@@ -21,9 +21,9 @@ fn problem() -> Problem {
         knots: uniform_knots(&grid, 6),
     };
     let list = vec![
-        CoefficientFunction::free(CoefficientKind::Mass, basis, &grid, vec![0.9; 6]),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
+        CoefficientFunction::free(CoefficientKind::MASS, basis, &grid, vec![0.9; 6]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, NODES),
+        CoefficientFunction::fixed(CoefficientKind::STIFFNESS, vec![1.0; NODES]),
     ];
     common::problem_of(system, list, observed, None)
 }

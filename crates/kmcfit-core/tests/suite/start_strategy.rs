@@ -42,9 +42,9 @@ fn problem() -> Problem {
     // The noise is given as zero; a rule that estimates it would treat so few samples as noise.
     let weighting = Weighting::Sigma(1e-8);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
-        CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 130.0, nodes),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::DAMPING, vec![0.05; nodes]),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 130.0, nodes),
     ];
     let channel = Channel::displacement_at_nodes(observed, STRIDE, weighting, &system.grid);
     let experiment = Experiment::free("free decay", common::initial(), nodes).with_channel(channel);
@@ -160,10 +160,10 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         .with_excitation(excitation)
         .with_channel(channel);
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
-        CoefficientKind::CubicStiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
+        CoefficientKind::CUBIC_STIFFNESS,
     ];
     let list = quantities.into_iter().zip([1.2, 1.0, 18.0, 12.0]);
     let list = list.map(|(quantity, start)| CoefficientFunction::constant(quantity, start, nodes));
@@ -239,9 +239,9 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
     };
     let channel = Channel::displacement_at_nodes(observed, 1, weighting, &system.grid);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
-        CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
-        CoefficientFunction::constant(CoefficientKind::Stiffness, 2.0, nodes),
+        CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]),
+        CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, nodes),
+        CoefficientFunction::constant(CoefficientKind::STIFFNESS, 2.0, nodes),
     ];
     let functions = Parameterization::new(list, nodes, system.grid.step()).unwrap();
     let experiment = Experiment::free("rubbish", common::initial(), nodes).with_channel(channel);

@@ -47,8 +47,8 @@ impl Setup {
     fn free(kind: ChannelKind) -> Self {
         Self {
             terms: vec![
-                (Law::Damping, CoefficientKind::Damping),
-                (Law::Stiffness, CoefficientKind::Stiffness),
+                (Law::Damping, CoefficientKind::DAMPING),
+                (Law::Stiffness, CoefficientKind::STIFFNESS),
             ],
             truth: vec![1.0, 0.2, 4.0],
             start: vec![None, Some(0.25), Some(3.8)],
@@ -115,7 +115,7 @@ impl Setup {
         let system = self.system();
         let grid = system.grid;
         let quantities =
-            std::iter::once(CoefficientKind::Mass).chain(self.terms.iter().map(|t| t.1));
+            std::iter::once(CoefficientKind::MASS).chain(self.terms.iter().map(|t| t.1));
         let list = quantities.zip(self.start.iter().zip(&self.truth));
         let list = list
             .map(|(quantity, (start, truth))| match start {
@@ -276,9 +276,9 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
             knots: uniform_knots(&grid, knots),
         };
         let list = vec![
-            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
-            CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.2; NODES]),
-            CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, vec![4.0; knots]),
+            CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; NODES]),
+            CoefficientFunction::fixed(CoefficientKind::DAMPING, vec![0.2; NODES]),
+            CoefficientFunction::free(CoefficientKind::STIFFNESS, basis, &grid, vec![4.0; knots]),
         ];
         problem = problem
             .with(|parts| {

@@ -44,11 +44,11 @@ fn truth(n: usize) -> Vec<f64> {
 }
 
 fn kinds(n: usize) -> Vec<CoefficientKind> {
-    let masses = std::iter::repeat_n(CoefficientKind::Mass, n);
-    let link = [CoefficientKind::Damping, CoefficientKind::Stiffness];
+    let masses = std::iter::repeat_n(CoefficientKind::MASS, n);
+    let link = [CoefficientKind::DAMPING, CoefficientKind::STIFFNESS];
     let links = std::iter::repeat_n(link, n).flatten();
     (masses.chain(links))
-        .chain([CoefficientKind::CubicStiffness])
+        .chain([CoefficientKind::CUBIC_STIFFNESS])
         .collect()
 }
 
@@ -109,14 +109,14 @@ impl Case {
             .map(|(kind, value)| CoefficientFunction::constant(kind, value, nodes))
             .collect();
         if first_mass_known {
-            functions[0] = CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]);
+            functions[0] = CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]);
         }
         let knots = Basis::PiecewiseLinear {
             knots: vec![0.5, 3.0, 6.5],
         };
         let stiffness = vec![40.0, 33.0, 38.0];
         functions[n + 1] =
-            CoefficientFunction::free(CoefficientKind::Stiffness, knots, &grid, stiffness);
+            CoefficientFunction::free(CoefficientKind::STIFFNESS, knots, &grid, stiffness);
         let channel = |kind, times: Vec<f64>| {
             let zeros = vec![0.0; times.len()];
             Channel::new(
@@ -288,7 +288,7 @@ fn compiled_steps_are_those_of_assembled_structures() {
             parts.system.structure = structure.expect("a structure");
             let nodes = parts.system.grid.nodes();
             let mut functions: Vec<CoefficientFunction> = parts.functions.iter().cloned().collect();
-            let nothing = CoefficientFunction::fixed(CoefficientKind::Mass, vec![0.0; nodes]);
+            let nothing = CoefficientFunction::fixed(CoefficientKind::MASS, vec![0.0; nodes]);
             functions.insert(1, nothing);
             let scalars = parts.functions.scalars().to_vec();
             let functions = parameterization(functions, n + 1, &parts.system.grid);
@@ -340,7 +340,7 @@ fn chains_are_recovered() {
         let problem = observed(case.problem(true), case.sigma);
         let truth = problem.start();
         // Springs of a fifth of the stiffness: natural frequencies of less than a half.
-        let is_spring = |f: usize| problem.functions.get(f).quantity == CoefficientKind::Stiffness;
+        let is_spring = |f: usize| problem.functions.get(f).quantity == CoefficientKind::STIFFNESS;
         let mut start: Vec<f64> = (truth.iter().enumerate())
             .map(|(j, x)| x * [1.5, 0.7, 1.2][j % 3])
             .collect();
@@ -456,7 +456,7 @@ fn a_nodal_stiffness_of_a_chain_within_bounds() {
         .collect();
     let start = vec![35.0; nodes];
     functions[5] =
-        CoefficientFunction::free(CoefficientKind::Stiffness, Basis::Nodal, &grid, start);
+        CoefficientFunction::free(CoefficientKind::STIFFNESS, Basis::Nodal, &grid, start);
     let functions = parameterization(functions, 2, &grid);
     let system = System {
         grid,

@@ -18,9 +18,9 @@ fn nodal_problem(truth: &NodalCoefficients, nodes: usize, bounded: bool, seed: u
     let system = common::system(nodes, Method::Midpoint);
     let observed = common::noisy(&system, truth, SIGMA, seed);
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let list = quantities
         .into_iter()

@@ -543,7 +543,7 @@ fn corrected_records_predict_another_record() {
 
 #[test]
 fn quadratic_damping_as_viscous() {
-    let of = CoefficientKind::QuadraticDamping;
+    let of = CoefficientKind::QUADRATIC_DAMPING;
     assert_found(
         Kind::QuadraticDamping,
         |reason| matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of),
@@ -552,7 +552,7 @@ fn quadratic_damping_as_viscous() {
 
 #[test]
 fn friction_left_out() {
-    let of = CoefficientKind::CoulombFriction;
+    let of = CoefficientKind::COULOMB_FRICTION;
     assert_found(
         Kind::Friction,
         |reason| matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of),

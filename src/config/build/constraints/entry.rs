@@ -162,7 +162,7 @@ impl ConstraintReader<'_> {
     /// Returns the constrained function. [`Self::check_companions`] has rejected kinds that need a function and lack one; for the
     /// others the value is unused.
     fn target_function(&self) -> CoefficientKind {
-        self.spec.function.unwrap_or(CoefficientKind::Mass)
+        self.spec.function.unwrap_or(CoefficientKind::MASS)
     }
 
     /// Returns the constraints of one entry: several for a list of shapes or of times, one for any other kind.

@@ -12,6 +12,7 @@ use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::record::{ChannelKind, Loss};
 use kmcfit_core::internals::signal::{
     Interpolation, Signal, Spectrum, driven_oscillator, is_kept_up, median, onset,
@@ -239,7 +240,7 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
 
 /// The mass that the measured force and the first channel imply, where it differs from the stated one by the factor between two units.
 fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
-    let stated = match file.spec.functions.mass.fixed.as_ref()? {
+    let stated = match (file.spec.functions.get(CoefficientKind::MASS)?.fixed).as_ref()? {
         KnownValue::Number(number) => number.0,
         KnownValue::Map(map) => map.value?.0,
         KnownValue::Unknown => return None,

@@ -179,12 +179,12 @@ impl Constraint {
             | Constraint::Mean { of, .. }
             | Constraint::Integral { of, .. } => vec![*of],
             Constraint::Equal { first, second, .. } => vec![*first, *second],
-            Constraint::Frequency { .. } => vec![CoefficientKind::Mass, CoefficientKind::Stiffness],
+            Constraint::Frequency { .. } => vec![CoefficientKind::MASS, CoefficientKind::STIFFNESS],
             Constraint::Passive | Constraint::DampingRatio { .. } => {
                 vec![
-                    CoefficientKind::Mass,
-                    CoefficientKind::Damping,
-                    CoefficientKind::Stiffness,
+                    CoefficientKind::MASS,
+                    CoefficientKind::DAMPING,
+                    CoefficientKind::STIFFNESS,
                 ]
             }
         }

@@ -309,10 +309,10 @@ mod tests {
             }
         };
         let list = vec![
-            CoefficientFunction::constant(CoefficientKind::Mass, 1.3, NODES),
-            function(CoefficientKind::Damping, 5, 0.2),
-            function(CoefficientKind::Stiffness, 20, 2.0),
-            function(CoefficientKind::Stiffness, 20, 3.0),
+            CoefficientFunction::constant(CoefficientKind::MASS, 1.3, NODES),
+            function(CoefficientKind::DAMPING, 5, 0.2),
+            function(CoefficientKind::STIFFNESS, 20, 2.0),
+            function(CoefficientKind::STIFFNESS, 20, 3.0),
         ];
         let coefficient_sets = vec![vec![0, 1, 2], vec![0, 1, 3]];
         let functions =

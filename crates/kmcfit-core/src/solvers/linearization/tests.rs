@@ -28,18 +28,18 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let nodes = grid.nodes();
     let constant = |quantity, start| CoefficientFunction::constant(quantity, start, nodes);
     let stiffness = match knots {
-        None => constant(CoefficientKind::Stiffness, 2.2),
+        None => constant(CoefficientKind::STIFFNESS, 2.2),
         Some(knots) => {
             let spacing = grid.duration() / f64::from(knots - 1);
             let knots: Vec<f64> = (0..knots).map(|i| f64::from(i) * spacing).collect();
             let start = knots.iter().map(|t| 2.2 + 1e-3 * t).collect();
             let basis = Basis::PiecewiseLinear { knots };
-            CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, start)
+            CoefficientFunction::free(CoefficientKind::STIFFNESS, basis, &grid, start)
         }
     };
     let list = vec![
-        constant(CoefficientKind::Mass, 1.1),
-        constant(CoefficientKind::Damping, 0.3),
+        constant(CoefficientKind::MASS, 1.1),
+        constant(CoefficientKind::DAMPING, 0.3),
         stiffness,
     ];
     let speed = ScalarParameter {

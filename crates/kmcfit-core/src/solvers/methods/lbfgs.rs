@@ -236,7 +236,7 @@ impl<'p> Coordinates<'p> {
         let mut logarithmic = vec![false; parameters.len()];
         for (function, range) in functions.iter().zip(functions.ranges()) {
             let all_positive = parameters[range.clone()].iter().all(|p| *p > 0.0);
-            if function.quantity == CoefficientKind::Mass
+            if function.quantity == CoefficientKind::MASS
                 && function.positive_parameters
                 && all_positive
             {

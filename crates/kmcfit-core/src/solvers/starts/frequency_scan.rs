@@ -273,8 +273,12 @@ impl<'a> Descent<'a> {
         let functions = &problem.functions;
         let mut is_logarithmic = vec![false; problem.parameters()];
         for (function, range) in functions.iter().zip(functions.ranges()) {
-            use CoefficientKind::{Damping, Mass, Stiffness};
-            let has_sign = matches!(function.quantity, Mass | Damping | Stiffness);
+            let has_sign = [
+                CoefficientKind::MASS,
+                CoefficientKind::DAMPING,
+                CoefficientKind::STIFFNESS,
+            ]
+            .contains(&function.quantity);
             is_logarithmic[range.clone()].fill(has_sign && function.positive_parameters);
         }
         Self {

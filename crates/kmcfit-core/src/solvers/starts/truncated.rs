@@ -239,9 +239,9 @@ mod tests {
     fn free_decay(nodes: usize, stride: usize) -> Problem {
         let grid = Grid::new(0.0, 40.0, nodes).expect("a grid");
         let list = vec![
-            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
-            CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
-            CoefficientFunction::constant(CoefficientKind::Stiffness, 20.0, nodes),
+            CoefficientFunction::fixed(CoefficientKind::MASS, vec![1.0; nodes]),
+            CoefficientFunction::constant(CoefficientKind::DAMPING, 0.1, nodes),
+            CoefficientFunction::constant(CoefficientKind::STIFFNESS, 20.0, nodes),
         ];
         let functions = Parameterization::new(list, nodes, grid.step()).expect("functions");
         let samples = vec![0.0; nodes.div_ceil(stride)];

@@ -5,7 +5,7 @@ use super::Motion;
 use super::stage::{Scalar, StageValues};
 use super::step::{Source, Steps};
 use crate::step::{Cause, Trajectory};
-use crate::structure::{Ends, Law, Structure, StructureError};
+use crate::structure::{CoefficientKind, Ends, Law, Structure, StructureError};
 use crate::system::{Excitation, Method, StageSamples, SupportMotion};
 use num_dual::Dual64;
 use rand::{Rng, RngExt, SeedableRng};
@@ -20,18 +20,13 @@ impl Scalar for Dual64 {
 }
 
 const METHODS: [Method; 3] = [Method::Midpoint, Method::Rk4, Method::ImplicitMidpoint];
-const LAWS: [Law; 10] = [
-    Law::Damping,
-    Law::Stiffness,
-    Law::QuadraticStiffness,
-    Law::CubicStiffness,
-    Law::QuinticStiffness,
-    Law::QuadraticDamping,
-    Law::CoulombFriction { width: 0.2 },
-    Law::Offset,
-    Law::BoucWen { exponent: 1 },
-    Law::BoucWen { exponent: 3 },
-];
+/// All laws.
+fn laws() -> Vec<Law> {
+    let of_table = CoefficientKind::ALL.into_iter();
+    let of_table = of_table.filter_map(|kind| kind.law(0.2));
+    let with_states = [1, 3].map(|exponent| Law::BoucWen { exponent });
+    of_table.chain(with_states).collect()
+}
 
 /// A structure with random rows, values and inputs.
 struct Case {
@@ -75,7 +70,7 @@ impl Case {
                 ]
             })
             .collect();
-        elements.extend(LAWS.map(|law| (law, ends(&mut random))));
+        elements.extend(laws().into_iter().map(|law| (law, ends(&mut random))));
         let masses = inertias.iter().map(|_| 1.5);
         let coefficients = elements.iter().flat_map(|(law, _)| match law {
             Law::Stiffness => vec![3.0],

@@ -106,13 +106,13 @@ pub fn envelopes(
             .find(|f| problem.functions.get(**f).quantity == q)
     };
     let ratios = [
-        ("k/m", CoefficientKind::Stiffness, "1/s^2"),
-        ("c/m", CoefficientKind::Damping, "1/s"),
+        ("k/m", CoefficientKind::STIFFNESS, "1/s^2"),
+        ("c/m", CoefficientKind::DAMPING, "1/s"),
     ];
     // A ratio of sums with known parts is not a ratio of two functions.
     let ratios = ratios.into_iter().filter(|_| set.known_parts().is_empty());
     for (name, over, unit) in ratios {
-        if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::Mass)) {
+        if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::MASS)) {
             jobs.push((name.to_owned(), unit, ratios_at(problem, over, mass, times)));
         }
     }

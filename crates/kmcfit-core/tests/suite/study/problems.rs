@@ -38,9 +38,9 @@ pub fn constants(
     known: [f64; 3],
 ) -> Vec<CoefficientFunction> {
     let quantities = [
-        CoefficientKind::Mass,
-        CoefficientKind::Damping,
-        CoefficientKind::Stiffness,
+        CoefficientKind::MASS,
+        CoefficientKind::DAMPING,
+        CoefficientKind::STIFFNESS,
     ];
     let each = quantities.into_iter().zip(starts).zip(known);
     each.map(|((quantity, estimated), known)| match estimated {
@@ -171,7 +171,7 @@ pub fn knots(truth: &dyn Fn(f64) -> f64, knots: usize, sigma: f64, seed: u64) ->
     };
     let start = basis.constant(&grid, 2.0);
     let mut list = constants(201, [None, Some(0.1), None], [1.0, 0.0, 2.0]);
-    list[2] = CoefficientFunction::free(CoefficientKind::Stiffness, basis, &grid, start);
+    list[2] = CoefficientFunction::free(CoefficientKind::STIFFNESS, basis, &grid, start);
     let record = Record {
         weighting: Weighting::Sigma(sigma),
         ..Record::of(values, 2)

@@ -205,7 +205,7 @@ fn a_nodal_function_has_a_profile() {
     let nodal = crate::common::paper_system(101);
     let values = crate::common::noisy(&system, &nodal, sigma, 5);
     let mut list = constants(101, [None; 3], [1.0, 0.0, 1.0]);
-    list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
+    list[0] = CoefficientFunction::nodal(CoefficientKind::MASS, vec![1.0; 101]);
     let mut problem = crate::common::problem_of(system, list, values, Some(sigma));
     let rows = Basis::Nodal.roughness(&problem.system.grid, 2);
     problem.penalize(Penalty::new(0, 2, 1e4, rows)).unwrap();

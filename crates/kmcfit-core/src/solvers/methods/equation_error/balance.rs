@@ -9,70 +9,16 @@ use crate::record::Measurements;
 use crate::simd::sum::rms;
 use serde::{Deserialize, Serialize};
 
-/// A force of the equation of motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EquationPart {
-    /// Inertia `m (y'' + b'')`.
-    Inertia,
-    /// Damping `c y'`.
-    Damping,
-    /// Force of the spring, `k y`.
-    Stiffness,
-    /// Quadratic stiffness.
-    QuadraticStiffness,
-    /// Cubic stiffness.
-    CubicStiffness,
-    /// Quintic stiffness.
-    QuinticStiffness,
-    /// Quadratic damping.
-    QuadraticDamping,
-    /// Coulomb friction.
-    CoulombFriction,
-    /// Static force.
-    StaticForce,
-    /// Measured force `f`.
-    Force,
-}
-
-impl EquationPart {
-    /// The force of a coefficient.
-    pub fn of(kind: CoefficientKind) -> Self {
-        match kind {
-            CoefficientKind::Mass => Self::Inertia,
-            CoefficientKind::Damping => Self::Damping,
-            CoefficientKind::Stiffness => Self::Stiffness,
-            CoefficientKind::QuadraticStiffness => Self::QuadraticStiffness,
-            CoefficientKind::CubicStiffness => Self::CubicStiffness,
-            CoefficientKind::QuinticStiffness => Self::QuinticStiffness,
-            CoefficientKind::QuadraticDamping => Self::QuadraticDamping,
-            CoefficientKind::CoulombFriction => Self::CoulombFriction,
-            CoefficientKind::Offset => Self::StaticForce,
-        }
-    }
-
-    /// Name in prose.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Inertia => "inertia",
-            Self::Damping => "damping",
-            Self::Stiffness => "stiffness",
-            Self::QuadraticStiffness => "quadratic stiffness",
-            Self::CubicStiffness => "cubic stiffness",
-            Self::QuinticStiffness => "quintic stiffness",
-            Self::QuadraticDamping => "quadratic damping",
-            Self::CoulombFriction => "friction",
-            Self::StaticForce => "static force",
-            Self::Force => "force",
-        }
-    }
-}
+/// Name of the inertia force `m (y'' + b'')` among the forces of a balance.
+pub const INERTIA: &str = "inertia";
+/// Name of the measured force.
+const FORCE: &str = "force";
 
 /// Size of one force beside the residual.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EquationShare {
-    /// The force.
-    pub part: EquationPart,
+    /// The force: `inertia`, the name of a coefficient, or `force` for the measured one.
+    pub part: String,
     /// Its root mean square, N (N m for a rotation).
     pub rms: f64,
     /// Root mean square of the residual, relative to it.
@@ -105,8 +51,11 @@ pub fn equation_balance(problem: &Problem, theta: &[f64]) -> Option<EquationBala
     }
     let terms = problem.system.laws().len();
     let kinds = problem.functions.coefficient_set(0).iter();
-    let kinds = kinds.map(|f| EquationPart::of(problem.functions.get(*f).quantity));
-    let parts: Vec<EquationPart> = kinds.chain([EquationPart::Force]).collect();
+    let kinds = kinds.map(|f| match problem.functions.get(*f).quantity {
+        CoefficientKind::MASS => INERTIA,
+        kind => kind.name(),
+    });
+    let parts: Vec<&str> = kinds.chain([FORCE]).collect();
     let mut forces = vec![Vec::new(); terms + 2];
     let mut residuals = Vec::new();
     for equation in &equations.list {
@@ -129,7 +78,7 @@ pub fn equation_balance(problem: &Problem, theta: &[f64]) -> Option<EquationBala
         residual_rms,
         parts: sizes
             .map(|(part, rms)| EquationShare {
-                part,
+                part: part.to_owned(),
                 rms,
                 residual_share: residual_rms / rms,
             })

@@ -37,12 +37,12 @@ const MOST_TERMS: usize = 2;
 /// Kinds of terms that are tested. The factor of a quadratic or quintic stiffness is close to that of a static force or of a cubic stiffness,
 /// whose names it would take where no refit compares them: the weak form tests a quintic beside a cubic alone.
 pub(crate) const TESTED_TERMS: [CoefficientKind; 6] = [
-    CoefficientKind::QuadraticStiffness,
-    CoefficientKind::CubicStiffness,
-    CoefficientKind::QuinticStiffness,
-    CoefficientKind::QuadraticDamping,
-    CoefficientKind::CoulombFriction,
-    CoefficientKind::Offset,
+    CoefficientKind::QUADRATIC_STIFFNESS,
+    CoefficientKind::CUBIC_STIFFNESS,
+    CoefficientKind::QUINTIC_STIFFNESS,
+    CoefficientKind::QUADRATIC_DAMPING,
+    CoefficientKind::COULOMB_FRICTION,
+    CoefficientKind::STATIC_FORCE,
 ];
 
 /// A term of the equation of motion that the residuals show and the model does not have.
@@ -113,32 +113,32 @@ fn candidates(problem: &Problem, equations: &Equations) -> Vec<Candidate> {
     };
     let in_bands = measured().any(|m| m.corner.is_some());
     // Where the model has no spring, a nonlinear one takes the place of another misfit: only a linear one is tested.
-    let is_spring = |f: &&usize| problem.functions.get(**f).quantity == CoefficientKind::Stiffness;
+    let is_spring = |f: &&usize| problem.functions.get(**f).quantity == CoefficientKind::STIFFNESS;
     let has_spring = set.iter().find(is_spring).is_some_and(|f| {
         let function = problem.functions.get(*f);
         function.parameters() > 0 || function.offset.iter().any(|k| *k != 0.0)
     });
     let kinds = TESTED_TERMS.into_iter().map(|kind| match kind {
-        CoefficientKind::CubicStiffness if !has_spring => CoefficientKind::Stiffness,
+        CoefficientKind::CUBIC_STIFFNESS if !has_spring => CoefficientKind::STIFFNESS,
         kind => kind,
     });
     kinds
         // The filter of an acceleration removes a static force.
         .filter(|kind| {
-            let is_tested = match kind {
-                CoefficientKind::Stiffness => true,
-                CoefficientKind::QuadraticStiffness => false,
-                CoefficientKind::QuinticStiffness => {
-                    is_there(CoefficientKind::CubicStiffness) && !is_there(*kind)
+            let is_tested = match *kind {
+                CoefficientKind::STIFFNESS => true,
+                CoefficientKind::QUADRATIC_STIFFNESS => false,
+                CoefficientKind::QUINTIC_STIFFNESS => {
+                    is_there(CoefficientKind::CUBIC_STIFFNESS) && !is_there(*kind)
                 }
-                kind => !is_there(*kind),
+                kind => !is_there(kind),
             };
-            is_tested && !(in_bands && *kind == CoefficientKind::Offset)
+            is_tested && !(in_bands && *kind == CoefficientKind::STATIC_FORCE)
         })
         .filter_map(|kind| {
             Some(Candidate {
                 kind,
-                term: kind.term(width)?,
+                term: kind.law(width)?,
             })
         })
         .collect()
@@ -217,7 +217,7 @@ impl<'a> WeakForm<'a> {
             value: -slope,
             t: -slope / error.max(f64::MIN_POSITIVE),
             share: slope.abs() * size / self.largest,
-            width: candidate.term.friction_width(),
+            width: candidate.term.width(),
         })
     }
 }

@@ -22,7 +22,7 @@ mod robust;
 mod rows;
 mod widths;
 
-pub use balance::{EquationBalance, EquationPart, EquationShare, equation_balance};
+pub use balance::{EquationBalance, EquationShare, equation_balance};
 pub use equation::EquationForm;
 pub(in crate::solvers) use fit::fit;
 pub(crate) use missing_terms::TESTED_TERMS;

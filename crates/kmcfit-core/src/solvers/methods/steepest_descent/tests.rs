@@ -21,9 +21,9 @@ fn problem() -> Problem {
         CoefficientFunction::free(quantity, Basis::Nodal, &grid, vec![start; NODES])
     };
     let list = vec![
-        nodal(CoefficientKind::Mass, 2.0),
-        nodal(CoefficientKind::Damping, 1.0),
-        nodal(CoefficientKind::Stiffness, 1.0),
+        nodal(CoefficientKind::MASS, 2.0),
+        nodal(CoefficientKind::DAMPING, 1.0),
+        nodal(CoefficientKind::STIFFNESS, 1.0),
     ];
     let functions = Parameterization::new(list, NODES, grid.step()).expect("functions");
     let times = grid.times().into_iter();
