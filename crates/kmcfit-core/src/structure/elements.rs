@@ -29,6 +29,12 @@ pub enum Law {
     },
     /// `p(t)`, in N: a static force, positive in the direction of negative `x`.
     Offset,
+    /// `p(t) (x - (s(x + width) - s(x - width)) / 2)` with `s(u) = sqrt(u^2 + (width / 1000)^2)`, p in N/m: a spring that acts beyond a
+    /// clearance on both sides. The force differs from that with sharp corners by at most `p width / 2000`.
+    Gap {
+        /// Clearance on each side, m; positive.
+        width: f64,
+    },
     /// Hysteresis of Bouc and Wen: `p(t) z`, p in N/m, of an internal state with `z' = r - |z|^(n-1) (beta(t) |r| z + gamma(t) r |z|)`, `z` in m,
     /// `beta` and `gamma` in 1/m^n (Wen, Journal of the Engineering Mechanics Division 102, 1976). Its steps are assembled.
     BoucWen {
@@ -41,7 +47,7 @@ impl Law {
     /// Width of a law that has one.
     pub fn width(&self) -> Option<f64> {
         match self {
-            Law::CoulombFriction { width } => Some(*width),
+            Law::CoulombFriction { width } | Law::Gap { width } => Some(*width),
             _ => None,
         }
     }
@@ -66,6 +72,10 @@ impl Law {
             Law::QuadraticDamping => r.abs() * r,
             Law::CoulombFriction { width } => r / (r * r + r.like(width * width)).sqrt(),
             Law::Offset => x.like(1.0),
+            Law::Gap { width } => {
+                let [above, below] = [width, -width].map(|end| corner(x + x.like(end), width));
+                x - (above - below).scale(0.5)
+            }
             // See `Law::with_internal_state`.
             Law::BoucWen { .. } => x.like(0.0),
         }
@@ -86,9 +96,21 @@ impl Law {
                 let square = r * r + r.like(width * width);
                 [None, Some(r.like(width * width) / (square * square.sqrt()))]
             }
+            Law::Gap { width } => {
+                let ends = [width, -width].map(|end| x + x.like(end));
+                let [above, below] = ends.map(|u| u / corner(u, width));
+                [Some(x.like(1.0) - (above - below).scale(0.5)), None]
+            }
             Law::Offset | Law::BoucWen { .. } => [None, None],
         }
     }
+}
+
+/// `|u|` with a corner that is rounded over a thousandth of `width`.
+#[inline(always)]
+fn corner<T: Real>(u: T, width: f64) -> T {
+    let rounding = 1e-3 * width;
+    (u * u + u.like(rounding * rounding)).sqrt()
 }
 
 /// A row of the table.
@@ -115,7 +137,7 @@ pub struct CoefficientRow {
 }
 
 /// The rows in program order: a new element is a row here, a variant of [`Law`] with force and slopes, and its test.
-const TABLE: [CoefficientRow; 9] = [
+const TABLE: [CoefficientRow; 10] = [
     CoefficientRow {
         name: "mass",
         symbol: "m",
@@ -216,6 +238,17 @@ const TABLE: [CoefficientRow; 9] = [
         units_over_mass: ["m/s^2", "rad/s^2"],
         width: None,
         law: Some(|_| Law::Offset),
+    },
+    CoefficientRow {
+        name: "gap_stiffness",
+        symbol: "k_g",
+        words: "a spring beyond a gap",
+        text: "Stiffness of a spring that acts beyond a clearance of `width` (m) on both sides.",
+        example: "{basis: constant, start: 100.0, width: 0.001}",
+        units: ["N/m", "N m/rad"],
+        units_over_mass: ["1/s^2", "1/s^2"],
+        width: Some("the clearance on each side in m, which some of the motion exceeds"),
+        law: Some(|width| Law::Gap { width }),
     },
 ];
 
