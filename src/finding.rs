@@ -1,5 +1,6 @@
-//! Findings, warnings and suggestions of a document: a kind, its quantities and a sentence.
+//! Findings, warnings and suggestions of a document: severity, kind, quantities and a sentence.
 
+use kmcfit_core::internals::assessment::Severity;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt;
@@ -8,6 +9,9 @@ use std::fmt;
 /// field `text`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
+    /// Severity; absent from the document for a note.
+    #[serde(default, skip_serializing_if = "is_note")]
+    pub level: Severity,
     /// Kind, in snake case.
     pub kind: String,
     /// Quantities by name.
@@ -17,10 +21,15 @@ pub struct Finding {
     pub text: String,
 }
 
+fn is_note(level: &Severity) -> bool {
+    *level == Severity::Note
+}
+
 impl Finding {
-    /// A finding without quantities.
+    /// A note without quantities.
     pub fn new(kind: impl Into<String>, text: impl Into<String>) -> Self {
         Self {
+            level: Severity::Note,
             kind: kind.into(),
             quantities: Map::new(),
             text: text.into(),
@@ -70,6 +79,13 @@ impl Finding {
     /// The finding of a variant whose sentence is its `Display`.
     pub fn stated(variant: &(impl Serialize + fmt::Display)) -> Self {
         Self::of(variant, variant.to_string())
+    }
+
+    /// The finding with at least this severity.
+    #[must_use]
+    pub fn rated(mut self, level: Severity) -> Self {
+        self.level = self.level.max(level);
+        self
     }
 
     /// A quantity that is a text.

@@ -71,14 +71,12 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
 /// As [`fit_model`]; a fit whose problem has no response from any start has the status infeasible or failed, where its method states one.
 ///
 /// # Errors
-/// A [`SimulationError`] if no starting point can be simulated, and the method states no outcome without a response.
-pub fn fit_or_no_response(
-    model: &Model,
-    watch: &mut Observer,
-) -> Result<ModelFit, SimulationError> {
+/// A sentence if no starting point can be simulated, and the method states no outcome without a response.
+pub fn fit_or_no_response(model: &Model, watch: &mut Observer) -> Result<ModelFit, String> {
     fit_model(model, watch).or_else(|breakdown| {
         let (problem, settings) = (&model.problem, &model.settings);
-        let fit = no_response(problem, &model.given_start, settings, breakdown)?;
+        let fit = no_response(problem, &model.given_start, settings, breakdown)
+            .map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))?;
         Ok(ModelFit {
             model: model.clone(),
             weights: None,

@@ -10,14 +10,17 @@
 //! 2. [`fitting`] fits the problem.
 //! 3. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
 //!    runs; [`results`] makes folders of runs, which appear whole or not at all.
-//! 4. [`fleet`] fits one model to many records, with a row of results for each.
-//! 5. [`cli`] is one file per command.
+//! 4. [`analyse`] does this in memory, without files and threads, and builds for WebAssembly without the feature `program`.
+//! 5. [`fleet`] fits one model to many records, with a row of results for each.
+//! 6. [`cli`] is one file per command.
 // All output passes `cli::output`, all changes of files `results`, all thread starts `threads` of the core.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
 #![allow(
     clippy::result_large_err,
     reason = "an input error ends the program: its size costs nothing, its detail helps"
 )]
+pub mod analysis;
+#[cfg(feature = "program")]
 pub mod cli;
 mod clock;
 pub mod config;
@@ -26,6 +29,7 @@ pub mod error;
 mod escape;
 pub mod finding;
 pub mod fitting;
+#[cfg(feature = "program")]
 pub mod fleet;
 pub mod formats;
 pub mod guide;
@@ -36,10 +40,10 @@ mod number_format;
 pub mod quantity_names;
 pub mod report;
 pub mod results;
-mod source_snippet;
 mod spelling;
 pub mod tables;
 mod text_io;
 pub mod units;
 
+pub use analysis::{Analysis, analyse};
 pub use report::Run;

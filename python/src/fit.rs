@@ -157,9 +157,7 @@ fn fitted(
     if let Some(error) = raised {
         return Err(Failure::Raised(error));
     }
-    let found = found.map_err(|breakdown| {
-        Failure::Numerical(format!("the start cannot be evaluated: {breakdown}"))
-    })?;
+    let found = found.map_err(Failure::Numerical)?;
     let analysis = Instant::now();
     let done = CompletedFit::of(found);
     let mut document = done.fitted(RequestedFiles::figures()).document();

@@ -37,10 +37,7 @@ pub fn read_text(py: Python<'_>, path: PathBuf) -> PyResult<String> {
 pub fn scaffold(py: Python<'_>, paths: Vec<PathBuf>) -> PyResult<String> {
     guarded(py, || {
         let sources: Vec<Source> = (paths.into_iter())
-            .map(|path| Source {
-                name: path.display().to_string(),
-                path,
-            })
+            .map(|path| Source::file(&path, path.display().to_string()))
             .collect();
         Ok(kmcfit::config::scaffold(&sources, &Statements::default())?.text)
     })

@@ -213,7 +213,7 @@ fn finish(
 /// Exit code of a comparison: success if every run converged or completed.
 pub(super) fn exit_code_of(comparison: &Comparison) -> u8 {
     let statuses = || comparison.measures().iter().map(|m| m.status);
-    if statuses().any(|status| status == Status::Interrupted) {
+    if interrupt::is_asked() || statuses().any(|status| status == Status::Interrupted) {
         return interrupt::exit_code();
     }
     let is_complete = statuses().all(|status| exit_code(status) == OK);

@@ -8,6 +8,10 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 /// Origin of the clock.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the clock that the host provides"
+)]
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Provides the functions of the host.

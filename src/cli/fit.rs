@@ -16,11 +16,11 @@ use crate::report::{
 use crate::results::{OutputFolder, RESULT};
 use console::Term;
 use kmcfit_core::internals::assessment::VerdictLevel;
-use kmcfit_core::internals::solvers::{IterationEvent, IterationRecord, Observer, Status};
+use kmcfit_core::internals::host::Instant;
+use kmcfit_core::internals::solvers::{IterationEvent, IterationRecord, Observer};
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// Fit a model to its records, or constants to a record; write results, tables, figures and a report.
 #[derive(Debug, clap::Args)]
@@ -118,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         folder: &folder,
         inside: None,
     };
-    let (document, _) = fit_into(run, &file, &model, &progress, requested)?;
+    let document = fit_into(run, &file, &model, &progress, requested)?;
     print_results(&document, &out, &printed);
     Ok(code(&document, &printed))
 }
@@ -126,11 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
 /// The model that `kmcfit init` writes for a record.
 fn model_of_record(path: &Path) -> Result<ModelFile, InputError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let source = Source {
-        path: path.to_path_buf(),
-        name: name.into_owned(),
-    };
-    let found = scaffold(&[source], &Statements::default())?;
+    let found = scaffold(&[Source::file(path, name)], &Statements::default())?;
     say(
         "note",
         "constants are fitted, as `kmcfit init` writes them; model.yaml in the folder of the results has the model",
@@ -146,7 +142,11 @@ pub(super) fn read(file: &ModelFile) -> Result<Model, InputError> {
 
 /// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.
 pub(super) fn code(document: &ResultDocument, printed: &Printed) -> u8 {
-    let by_end = exit_code(document.outcome.status);
+    let mut reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
+    let by_end = match reasons.any(|reason| reason.kind == "stopped") {
+        true => interrupt::exit_code(),
+        false => exit_code(document.outcome.status),
+    };
     let level = document.verdict.as_ref().map(|verdict| verdict.level);
     match (by_end, level) {
         (0, Some(VerdictLevel::Inadequate)) if printed.strict => INADEQUATE,
@@ -230,7 +230,7 @@ pub(super) fn fit_into(
     model: &Model,
     progress: &Progress,
     requested: RequestedFiles,
-) -> Result<(ResultDocument, Status), CommandError> {
+) -> Result<ResultDocument, CommandError> {
     let clock = Instant::now();
     let full = |error| unwritable(run.folder.shown(), &error);
     run.write(MODEL, file.text.as_bytes()).map_err(full)?;
@@ -266,7 +266,7 @@ pub(super) fn fit_into(
     let total = (before.total + clock.elapsed()).max(overhead.sum() + fit.elapsed);
     document.timings = TimingsSummary::new(fit, &overhead, total);
     run.end(&document).map_err(full)?;
-    Ok((document, fit.outcome.status))
+    Ok(document)
 }
 
 /// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one.
@@ -281,7 +281,7 @@ pub(super) fn search(model: &Model, progress: &Progress) -> Result<ModelFit, Str
     }
     let result = fit_or_no_response(model, &mut watch);
     progress.clear();
-    result.map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))
+    result
 }
 
 #[cfg(test)]

@@ -140,10 +140,7 @@ fn sources(folder: &Path, files: &[PathBuf]) -> Result<Vec<Source>, InputError> 
             return Err(InputError::file(file, "the file is given twice")
                 .expected("each record once, as one experiment"));
         }
-        Ok(Source {
-            path: file.clone(),
-            name: named_from(folder, file),
-        })
+        Ok(Source::file(file, named_from(folder, file)))
     };
     files.iter().enumerate().map(source).collect()
 }

@@ -35,7 +35,10 @@ pub fn flag() -> Arc<AtomicBool> {
 
 /// Starts the thread that waits for signals.
 #[cfg(unix)]
-#[expect(clippy::disallowed_methods, reason = "a refusal is reported")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "a refusal is reported; the clock is that of the process"
+)]
 fn listen() -> io::Result<()> {
     // SIGINT is always taken: shells without job control start background jobs that ignore it.
     let signals = [SIGINT, SIGTERM, SIGHUP].into_iter();

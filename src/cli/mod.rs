@@ -19,6 +19,7 @@ mod retired;
 mod schema;
 mod shell;
 mod simulate;
+mod source_snippet;
 mod study;
 mod study_run;
 mod verify;

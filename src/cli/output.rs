@@ -4,10 +4,10 @@
 //! must not depend on it. A result that cannot be printed makes the program end with [`BAD_INPUT`](super::BAD_INPUT),
 //! after its files are written; a reader that has closed the pipe (`| head`) is no error.
 
+use super::source_snippet::Excerpt;
 use super::{BAD_INPUT, OK};
 use crate::error::InputError;
 use crate::escape::harmless;
-use crate::source_snippet::Excerpt;
 use console::style;
 use std::fmt::Display;
 use std::io::{self, Write};

@@ -9,13 +9,13 @@ use crate::report::document::Estimates;
 use crate::report::{CompletedFit, RequestedFiles};
 use crate::text_io::{LONGEST_TABLE, read_bytes};
 use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::internals::host::Instant;
 use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 /// Result of the fit of one record: a line of `rows.jsonl`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -131,13 +131,15 @@ fn fitted(
     let mut model = build(&file.with_record(name, content), BuildMode::Fit).map_err(text)?;
     model.settings.interrupt = Some(Arc::clone(interrupt));
     let mut ignore = |_: &IterationRecord| {};
-    let found = fit_or_no_response(&model, &mut Observer::new(&mut ignore))
-        .map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))?;
+    let found = fit_or_no_response(&model, &mut Observer::new(&mut ignore))?;
     if found.fit.outcome.status == Status::Interrupted {
         return Ok(None);
     }
-    let document = CompletedFit::of(found);
-    let document = document.fitted(RequestedFiles::default()).document();
+    let completed = CompletedFit::of(found);
+    if !completed.assessment.not_done.is_empty() {
+        return Ok(None);
+    }
+    let document = completed.fitted(RequestedFiles::default()).document();
     let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
     let findings = reasons.chain(&document.warnings);
     let mut warnings: Vec<String> = findings.map(|finding| finding.text.clone()).collect();

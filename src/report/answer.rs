@@ -7,6 +7,7 @@ use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
+use std::fmt;
 
 /// Half-width of an interval, relative to the estimate, below which it is not printed: samples without noise.
 const EXACT: f64 = 1e-7;
@@ -38,6 +39,18 @@ impl AnswerRow {
             (range, "") => format!("{} ({range})", self.status),
             (range, _) => format!("{} (mean; {range} over the record)", self.status),
         }
+    }
+}
+
+impl fmt::Display for AnswerRow {
+    /// One line: quantity, estimate with unit and interval, status.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = format!("{} {}", self.estimate, self.unit);
+        write!(f, "{}: {}", self.quantity, value.trim())?;
+        if !self.interval.is_empty() {
+            write!(f, " (95 % CI {})", self.interval)?;
+        }
+        write!(f, ", {}", self.status_and_range())
     }
 }
 

@@ -1,13 +1,13 @@
 //! Functions and identifiability of a fit, for its result document.
 
 use super::assumptions::assumptions;
-use super::document::{FindingLevel, FitFinding, IdentifiabilitySummary};
+use super::document::IdentifiabilitySummary;
 use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
 use crate::finding::Finding;
 use crate::number_format::resolved;
-use kmcfit_core::internals::assessment::{FitWarning, FunctionSummary, function_summaries};
+use kmcfit_core::internals::assessment::{Doubt, FunctionSummary, Severity, function_summaries};
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
@@ -16,28 +16,10 @@ use kmcfit_core::internals::identifiability::{
 use kmcfit_core::internals::problem::Jumps;
 use std::collections::BTreeMap;
 
-/// Findings in the order of their addition.
-#[derive(Default)]
-struct Findings(Vec<FitFinding>);
-
-impl Findings {
-    fn add(&mut self, is_warning: bool, finding: Finding) {
-        let level = match is_warning {
-            true => FindingLevel::Warning,
-            false => FindingLevel::Note,
-        };
-        self.0.push(FitFinding { level, finding });
-    }
-
-    fn warn(&mut self, finding: Finding) {
-        self.add(true, finding);
-    }
-}
-
 impl FittedModel<'_> {
     /// Findings and warnings on identifiability: the structural rank, the classification of the functions and the
     /// plausibility of the fit. A fit of the equation error simulates no response and has the classification alone.
-    pub(super) fn identifiability(&self) -> (IdentifiabilitySummary, Vec<FitFinding>) {
+    pub(super) fn identifiability(&self) -> (IdentifiabilitySummary, Vec<Finding>) {
         let problem = &self.model.problem;
         let mut summary = IdentifiabilitySummary {
             parameters: problem.parameters(),
@@ -49,18 +31,18 @@ impl FittedModel<'_> {
             ..IdentifiabilitySummary::default()
         };
         let Some(assessment) = &self.run_assessment.assessment else {
-            let mut found = Findings::default();
+            let mut found = Vec::new();
             self.add_equation_error(&mut found);
-            return (summary, found.0);
+            return (summary, found);
         };
-        let mut found = Findings::default();
+        let mut found = Vec::new();
         let count = structural_rank(problem);
         summary.rank_bound = count.rank_bound;
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
             summary.unidentified = true;
-            found.warn(findings::unidentified(reason));
-            return (summary, found.0);
+            found.push(findings::unidentified(reason).rated(Severity::Inadequate));
+            return (summary, found);
         }
         let classifications = &assessment.classifications;
         // Constraints and penalties may determine what the records do not.
@@ -69,37 +51,35 @@ impl FittedModel<'_> {
         if count.rank_bound < count.parameters && !all_identified {
             let finding = Finding::new("rank_bound", count.headline());
             let finding = finding.with("rank_bound", count.rank_bound);
-            found.warn(finding.with("parameters", count.parameters));
+            let finding = finding.with("parameters", count.parameters);
+            found.push(finding.rated(Severity::Warning));
         }
         for finding in &count.findings {
-            found.add(finding.is_warning(), findings::rank(finding));
+            found.push(findings::rank(finding).rated(warning_if(finding.is_warning())));
         }
         for jumps in &problem.jumps {
-            found.add(false, self.jumps(jumps));
+            found.push(self.jumps(jumps));
         }
         for classification in classifications {
             if classification.verdict != Classification::Fixed {
-                found.add(
-                    classification.is_open(),
-                    findings::classification(classification),
-                );
+                let severity = warning_if(classification.is_open());
+                found.push(findings::classification(classification).rated(severity));
             }
         }
         let negative = self.negative_damping();
         // The warning with the interval replaces that on most times.
-        let is_replaced = |warning: &&FitWarning| {
+        let is_replaced = |warning: &&Doubt| {
             let damping = CoefficientKind::DAMPING.name();
-            let is_damping =
-                matches!(warning, FitWarning::Negative { function } if function == damping);
+            let is_damping = matches!(warning, Doubt::Negative { function } if function == damping);
             is_damping && negative.is_some()
         };
         let warnings = plausibility.warnings.iter().filter(|w| !is_replaced(w));
-        warnings.for_each(|warning| found.warn(findings::warning(warning)));
-        negative.clone().into_iter().for_each(|n| found.warn(n));
+        warnings.for_each(|warning| found.push(findings::doubt(warning)));
+        negative.clone().into_iter().for_each(|n| found.push(n));
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
-        poor.for_each(|record| found.warn(findings::not_predicted(record)));
-        (summary, found.0)
+        poor.for_each(|doubt| found.push(findings::doubt(&doubt)));
+        (summary, found)
     }
 
     /// The jumps found in a function, with the levels between them.
@@ -124,21 +104,23 @@ impl FittedModel<'_> {
     }
 
     /// Adds the classification of a fit of the equation error, and the bias of its estimates.
-    fn add_equation_error(&self, found: &mut Findings) {
+    fn add_equation_error(&self, found: &mut Vec<Finding>) {
         let Some(equation) = &self.run_assessment.equation else {
             return;
         };
-        found.warn(findings::equation_error(equation.as_ref().err()));
+        let biased = findings::equation_error(equation.as_ref().err());
+        found.push(biased.rated(Severity::Warning));
         let missing = self.run_assessment.missing_terms.iter();
-        let missing = missing.map(|term| findings::warning(&FitWarning::MissingTerm(*term)));
-        missing.for_each(|warning| found.warn(warning));
+        let missing = missing.map(|term| findings::doubt(&Doubt::MissingTerm(*term)));
+        missing.for_each(|warning| found.push(warning));
         let Ok(intervals) = equation else {
             return;
         };
-        found.add(false, findings::kernel_covariance());
+        found.push(findings::kernel_covariance());
         let judged = intervals.classifications.iter();
         let judged = judged.filter(|c| c.verdict != Classification::Fixed);
-        judged.for_each(|judged| found.warn(findings::classification(judged)));
+        let judged = judged.map(findings::classification);
+        found.extend(judged.map(|finding| finding.rated(Severity::Warning)));
     }
 
     /// Warning where the whole confidence interval of a constant damping is negative.
@@ -153,7 +135,7 @@ impl FittedModel<'_> {
                 "c is negative (95 % CI {low} to {high} {}): the system gains energy",
                 damping.unit
             );
-            let finding = Finding::new("negative_damping", text);
+            let finding = Finding::new("negative_damping", text).rated(Severity::Warning);
             finding.with("value", value).with("half_width", half)
         })
     }
@@ -169,5 +151,12 @@ impl FittedModel<'_> {
                 (function.name(), FunctionSummary { unit, ..summary })
             })
             .collect()
+    }
+}
+
+fn warning_if(is_warning: bool) -> Severity {
+    match is_warning {
+        true => Severity::Warning,
+        false => Severity::Note,
     }
 }

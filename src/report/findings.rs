@@ -1,10 +1,11 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
+use super::suggestions::percent;
 use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{count, resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, NoIntervals, RecordError,
+    ClassicalEstimate, ClassicalMethod, CoarseBasis, Doubt, Implausible, NoIntervals, RecordError,
     Unidentified,
 };
 use kmcfit_core::internals::identifiability::{
@@ -120,141 +121,125 @@ pub fn jumps(name: &str, unit: &str, times: &[f64], levels: &[(f64, Option<[f64;
     finding.with("times", times).with("levels", values)
 }
 
-/// A validation record that the fit does not predict: name, and fit in per cent.
-pub fn not_predicted((record, percent): (&str, f64)) -> Finding {
-    let text = format!(
-        "validation record `{record}`: fit of {} only: the identified system does not predict this record",
-        super::suggestions::percent(percent, 0)
-    );
-    let finding = Finding::new("validation_not_predicted", text);
-    finding.with("record", record).with("fit_percent", percent)
-}
-
-/// A warning about a fit.
-pub fn warning(warning: &FitWarning) -> Finding {
-    let text = match warning {
-        FitWarning::BeyondSigma { times } => format!(
-            "no confidence intervals: the residuals are {} times sigma, so the model does not explain the record \
-             or sigma is too small",
+/// A doubt about a fit as a clause.
+pub fn doubt(doubt: &Doubt) -> Finding {
+    let text = match doubt {
+        Doubt::BeyondSigma { times } => format!(
+            "the residuals are {} times sigma: the model does not explain the record, or sigma is too small",
             times_in_words(*times)
         ),
-        FitWarning::CoarseSteps { times } => format!(
-            "no confidence intervals: halving the step changes the response by {} times the rms residual",
+        Doubt::CoarseSteps { times } => format!(
+            "the error of the time steps is {} times the residuals",
             times_in_words(*times)
         ),
-        FitWarning::PoorFit => {
-            "no confidence intervals: the residuals are large and autocorrelated".into()
-        }
-        FitWarning::Coloured {
+        Doubt::PoorFit { fit_percent } => format!(
+            "fit {}: the residuals are large and autocorrelated",
+            percent(*fit_percent, 0)
+        ),
+        Doubt::Coloured {
             covariance: ScoreCovariance::Model,
         } => {
-            "the residuals are autocorrelated: the true confidence intervals are wider than those given, because the noise \
-             model neglects this correlation"
-                .into()
+            "the residuals are autocorrelated beyond the noise model: the true confidence intervals are wider".to_owned()
         }
-        FitWarning::Coloured {
+        Doubt::Coloured {
             covariance: ScoreCovariance::Kernel,
         } => {
-            "the residuals are autocorrelated beyond the noise model: the confidence intervals come from a heteroscedasticity- \
-             and autocorrelation-consistent covariance; a term missing from the model leaves such residuals too"
-                .into()
+            "the residuals are autocorrelated beyond the noise model; the confidence intervals are heteroscedasticity- and \
+             autocorrelation-consistent"
+                .to_owned()
         }
-        FitWarning::Correlated => {
+        Doubt::Correlated => {
             "the residuals are autocorrelated: the confidence intervals assume correlated noise; a term missing from the model \
              leaves such residuals too"
-                .into()
+                .to_owned()
         }
-        FitWarning::Aliased {
+        Doubt::Aliased {
             per_period,
             frequency,
         } => format!(
-            "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz, systems of other natural frequencies \
-             fit equally well; use a higher sampling rate or unequal intervals"
+            "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz other frequencies fit equally well; sample faster or at \
+             unequal intervals"
         ),
-        FitWarning::CoarseBasis(basis) => coarse_basis(basis),
-        FitWarning::FastVariation {
+        Doubt::CoarseBasis(basis) => coarse_basis(basis),
+        Doubt::FastVariation {
             functions,
             per_period,
         } => format!(
-            "the {}: up to {} parameters a period; what varies within a period cannot be told from an offset, a harmonic or a second mode; a \
-             constant, or one knot in two periods, can",
+            "the {} can vary within a period (up to {} parameters in one), which offsets, harmonics and second modes look like",
             and_list(functions),
             significant(*per_period, 2)
         ),
-        FitWarning::Oscillates {
+        Doubt::Oscillates {
             function,
             frequency,
-        } => oscillates(function, *frequency),
-        FitWarning::InterpolationLoss {
-            experiment,
+        } => format!(
+            "the {function} oscillates at {} Hz, as a second mode that beats with the first makes it",
+            significant(*frequency, 2)
+        ),
+        Doubt::InterpolationLoss {
             input,
             share,
             errors,
+            ..
         } => format!(
-            "lines between the samples of the {} of {experiment} lose {} of it at the natural frequency; cubics in their place would shift \
-             an estimate by {} standard errors, which the intervals exclude",
+            "lines between the samples of the {} lose {} of it at the natural frequency, up to {} standard errors of an estimate",
             input.name().replace('_', " "),
-            super::suggestions::percent(100.0 * share, 2),
+            percent(100.0 * share, 2),
             significant(*errors, 2)
         ),
-        FitWarning::DisturbedInput {
+        Doubt::DisturbedInput {
             experiment,
             input,
             share,
             ..
-        } => {
-            let input = input.name().replace('_', " ");
-            format!(
-                "a disturbance enters through the equation of motion of {experiment}: noise of the {input} sensor ({} of the {input} \
-                 would explain the residuals), an unmeasured drive, or a missing term; the confidence intervals exclude it",
-                super::suggestions::percent(100.0 * share, 1)
-            )
-        }
-        FitWarning::CoherentResiduals {
-            experiment,
+        } => format!(
+            "a disturbance enters through the equation of motion of {experiment}: noise of the {} sensor ({} of it would do), an unmeasured \
+             drive, or a missing term; the intervals exclude it",
+            input.name().replace('_', " "),
+            percent(100.0 * share, 1)
+        ),
+        Doubt::CoherentResiduals {
             channel,
             input,
             share,
+            ..
         } => format!(
-            "{} of the variance of the residuals of the {channel} of {experiment} is coherent with the {}, after the noise model: \
-             a second mode, a missing force term or a delay; the confidence intervals exclude it",
-            super::suggestions::percent(100.0 * share, 0),
+            "{} of the variance of the {channel}'s residuals is coherent with the {}: dynamics are missing from the model",
+            percent(100.0 * share, 0),
             input.name().replace('_', " ")
         ),
-        FitWarning::ContradictedInputSigma {
+        Doubt::ContradictedInputSigma {
             experiment,
             input,
             given,
             likely,
         } => format!(
-            "the stated sigma of the {} of {experiment}, {} {unit}, is contradicted by the residuals: {} {unit} is most likely",
+            "the residuals contradict the stated sigma of the {} of {experiment}, {}: {} {} is most likely",
             input.name().replace('_', " "),
             significant(*given, 3),
             significant(*likely, 3),
-            unit = input.unit()
+            input.unit()
         ),
-        FitWarning::MissingTerm(missing) => format!(
-            "the residuals of the equation of motion show {} that the model does not have: {} = {} {} (t = {}), {} of the largest \
-             term; the other estimates are biased by it",
+        Doubt::MissingTerm(missing) => format!(
+            "the residuals show {} that the model does not have, of {} {} (t = {}, {} of the largest term): the estimates are biased by it",
             missing.term.row().words,
-            missing.term.name(),
             significant(missing.value, 3),
             missing.term.unit(),
             significant(missing.t, 2),
-            super::suggestions::percent(100.0 * missing.share, 1),
+            percent(100.0 * missing.share, 1),
         ),
-        FitWarning::TimeOrAmplitude(rival) => super::rivals::rival_in_words(rival),
-        FitWarning::SecondMode {
-            experiment,
+        Doubt::TimeOrAmplitude(rival) => super::rivals::rival_in_words(rival),
+        Doubt::SecondMode {
             frequencies: [first, second],
+            ..
         } => format!(
-            "two modes, at {} and {} Hz, explain the samples of {experiment}; the model has one",
-            significant(*first, 3),
-            significant(*second, 3)
+            "the record has a second mode at {} Hz beside that at {} Hz",
+            significant(*second, 3),
+            significant(*first, 3)
         ),
-        FitWarning::RecordError(error) => record_error(error),
-        FitWarning::ClassicalDisagrees(estimate) => classical(estimate),
-        FitWarning::ResidualMean {
+        Doubt::RecordError(error) => record_error(error),
+        Doubt::ClassicalDisagrees(estimate) => classical(estimate),
+        Doubt::ResidualMean {
             experiment,
             channel,
             t,
@@ -262,22 +247,18 @@ pub fn warning(warning: &FitWarning) -> Finding {
             or_static_force,
             ..
         } => format!(
-            "the residuals of the {channel} of {experiment} have a mean of {} standard deviations (t = {}): {}",
+            "the residuals of the {channel} of {experiment} have a mean of {} standard deviations (t = {}): an offset of the sensor{}",
             significant(*share, 2),
             significant(*t, 2),
-            match or_static_force {
-                true => "an offset of the sensor or a static force",
-                false => "an offset of the sensor",
-            }
+            if *or_static_force { " or a static force" } else { "" }
         ),
-        FitWarning::FrictionWidth {
+        Doubt::FrictionWidth {
             estimate,
             shift,
             unit,
             errors,
             width,
             better,
-            ..
         } if better <= width => {
             let errors = significant(*errors, 2);
             let shift = match shift {
@@ -285,31 +266,85 @@ pub fn warning(warning: &FitWarning) -> Finding {
                 None => format!("{errors} standard errors"),
             };
             format!(
-                "the estimates depend on the width of Coulomb friction: half of {} m/s shifts the {estimate} by {shift}",
+                "the {estimate} depends on the width of Coulomb friction: half of {} m/s shifts it by {shift}",
                 significant(*width, 3)
             )
         }
-        FitWarning::FrictionWidth { width, better, .. } => format!(
-            "the residuals ask for a larger width of Coulomb friction than {} m/s: about {} m/s",
+        Doubt::FrictionWidth { width, better, .. } => format!(
+            "a larger width of Coulomb friction than {} m/s fits better: about {} m/s",
             significant(*width, 3),
             significant(*better, 2)
         ),
-        FitWarning::Negative { function } => {
+        Doubt::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }
-        FitWarning::NegligibleForce { experiment } => format!(
+        Doubt::NegligibleForce { experiment } => format!(
             "the force of {experiment} is negligible beside the inertia force; check its unit"
         ),
+        Doubt::Failed { status } => format!("the fit ended {}", status.name()),
+        Doubt::NoSystem { reason } => unidentified(reason).text,
+        Doubt::NotConverged { status } => {
+            format!("the fit ended before it converged ({})", status.name())
+        }
+        Doubt::Saturation { channel } => {
+            format!("the {channel} saturates: many samples equal the largest one")
+        }
+        Doubt::CoarseInput {
+            experiment,
+            channel,
+        } => format!(
+            "the quantisation error of the {channel} of {experiment} is not small beside the residuals"
+        ),
+        Doubt::DelayAtLimit { parameter } => {
+            format!("the {parameter} is beyond its limits")
+        }
+        Doubt::NotPredicted {
+            experiment,
+            fit_percent,
+        } => format!(
+            "validation record {experiment} is not predicted (fit {})",
+            percent(*fit_percent, 0)
+        ),
+        Doubt::NotIdentified { functions } => format!(
+            "the samples do not identify {} at all times",
+            and_list(functions)
+        ),
+        Doubt::RankDeficient {
+            rank_bound,
+            parameters,
+        } => {
+            format!("at most {rank_bound} of {parameters} parameter combinations are identifiable")
+        }
+        Doubt::OnlyRatios => {
+            "no force is measured: the samples determine ratios to the mass only".to_owned()
+        }
+        Doubt::UnmeasuredForce => {
+            "no force is measured and an unknown one acts: the damping is not identifiable from this record by this method".to_owned()
+        }
+        Doubt::Stopped { not_done } => {
+            format!("stopped; not done: {}", not_done.join(", "))
+        }
+        Doubt::EquationError => {
+            "the equation error neglects the noise of the response, which biases the estimates"
+                .to_owned()
+        }
+        Doubt::EquationResidual { share } => format!(
+            "the residual of the equation of motion is {} of its largest force",
+            percent(100.0 * share, 0)
+        ),
+        Doubt::ImplausibleUnits(implausible) => {
+            let (quantity, value, unit) = match implausible {
+                Implausible::NaturalFrequency { value } => ("natural frequency", value, "Hz"),
+                Implausible::Velocity { value } => ("largest velocity", value, "m/s"),
+                Implausible::Displacement { value } => ("largest displacement", value, "m"),
+            };
+            format!(
+                "a {quantity} of {} {unit} is implausible: check the units of time and displacement",
+                significant(*value, 2)
+            )
+        }
     };
-    Finding::of(warning, text)
-}
-
-/// A function that oscillates, as a clause.
-pub fn oscillates(function: &str, frequency: f64) -> String {
-    format!(
-        "the {function} oscillates at {} Hz, as a second mode that beats with the first makes it",
-        significant(frequency, 2)
-    )
+    Finding::of(doubt, text).rated(doubt.severity())
 }
 
 /// A classical estimate beside that of the fit, as a clause.

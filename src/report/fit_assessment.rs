@@ -3,8 +3,8 @@
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
-    EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,
-    StepCheck, all_diagnostics,
+    Doubt, EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals,
+    POOR, Parts, StepCheck, all_diagnostics,
 };
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::identifiability::{Bands, Means};
@@ -34,6 +34,8 @@ pub struct RunAssessment {
     pub(super) validation: Vec<ValidationRecord>,
     /// Diagnostics of the residuals of each channel of each experiment.
     pub(super) diagnostics: Vec<Vec<ResidualDiagnostics>>,
+    /// Parts that a request to end left out.
+    pub(crate) not_done: Vec<&'static str>,
 }
 
 impl RunAssessment {
@@ -47,28 +49,37 @@ impl RunAssessment {
             Some(assessment) => assessment.plausibility.residuals.clone(),
             None => all_diagnostics(&model.problem, &fit.best.evaluation),
         };
+        let mut parts = Parts {
+            not_done: (assessment.as_ref()).map_or_else(Vec::new, |a| a.not_done.clone()),
+        };
+        let intervals = || EquationErrorIntervals::of(&model.problem, fit);
         let equation = (!is_simulated && model.problem.parameters() > 0)
-            .then(|| EquationErrorIntervals::of(&model.problem, fit));
+            .then(|| parts.part("confidence intervals", intervals))
+            .flatten();
         let is_poor = |d: &ResidualDiagnostics| d.fit_percent < POOR;
         let lacks_force = match &equation {
             Some(equation) => matches!(equation, Err(NoIntervals::UnmeasuredForce)),
             None => model.is_kept_up() && diagnostics.iter().flatten().all(is_poor),
         };
+        let terms = || missing_terms(&model.problem, &fit.best.parameters);
+        let terms = (!is_simulated).then(|| parts.part("tests of what the model lacks", terms));
+        let has_balance = !is_simulated && fit.outcome.status != Status::Failed;
+        let balance = || equation_balance(&model.problem, &fit.best.parameters);
+        let balance = has_balance.then(|| parts.part("balance of the equation", balance));
+        let validation = validation.filter_map(|out| {
+            parts.part("a validation record", || {
+                ValidationRecord::of(model, fit, out)
+            })
+        });
         Self {
             assessment,
             lacks_force,
             equation,
-            missing_terms: match is_simulated {
-                true => Vec::new(),
-                false => missing_terms(&model.problem, &fit.best.parameters),
-            },
-            balance: (!is_simulated && fit.outcome.status != Status::Failed)
-                .then(|| equation_balance(&model.problem, &fit.best.parameters))
-                .flatten(),
-            validation: validation
-                .map(|out| ValidationRecord::of(model, fit, out))
-                .collect(),
+            missing_terms: terms.flatten().unwrap_or_default(),
+            balance: balance.flatten().flatten(),
+            validation: validation.collect(),
             diagnostics,
+            not_done: parts.not_done,
         }
     }
 
@@ -147,12 +158,16 @@ impl ValidationRecord {
         }
     }
 
-    /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
-    pub fn poor(&self) -> Option<(&str, f64)> {
+    /// The doubt where the fitted system does not predict it.
+    pub fn poor(&self) -> Option<Doubt> {
         let channels = self.channels();
         let fits = channels.iter().map(|c| c.diagnostics.fit_percent);
-        let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
-        Some((&self.out.experiment.name, worst))
+        let fit_percent = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
+        let experiment = self.out.experiment.name.clone();
+        Some(Doubt::NotPredicted {
+            experiment,
+            fit_percent,
+        })
     }
 
     /// Its channels in units for display; empty without a response.

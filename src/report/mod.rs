@@ -55,8 +55,7 @@ mod timings;
 pub mod trial;
 mod verdict;
 
-pub(crate) use answer::quantity;
-pub use answer::{AnswerRow, answer};
+pub use answer::{AnswerRow, answer, quantity};
 pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
 pub use compare::Comparison;
 pub use completed_fit::{CoefficientCurve, CompletedFit, model_predictions};

@@ -18,6 +18,7 @@ use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use kmcfit_core::internals::assessment::Estimate;
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
+use kmcfit_core::internals::host::Instant;
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
@@ -26,7 +27,7 @@ use kmcfit_core::internals::system::Excitation;
 use kmcfit_core::internals::threads::{analyses_at_once, map};
 use std::io;
 use std::sync::{Mutex, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The page.
 const PAGE: &str = "report.html";

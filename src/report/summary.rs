@@ -84,7 +84,7 @@ fn data_lines(document: &ResultDocument) -> Vec<String> {
         0 => first.text.clone(),
         _ => format!("{}; {more} more in result.json", first.text),
     });
-    let warnings = Finding::texts(&document.warnings);
+    let warnings = document.other_warnings(document.warnings.iter());
     line.into_iter().chain(warnings).collect()
 }
 
@@ -128,10 +128,7 @@ fn details(document: &ResultDocument) -> String {
             "Identifiability",
             document.notes().map(Finding::to_string).collect(),
         ),
-        (
-            "Warnings",
-            document.fit_warnings().map(Finding::to_string).collect(),
-        ),
+        ("Warnings", document.other_warnings(document.fit_warnings())),
     ];
     text += &under_headings(lists, 15);
     let parameters = nuisance_parameters(&document.nuisance_parameters).into_iter();

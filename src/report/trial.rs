@@ -1,6 +1,6 @@
 //! Advice is tried before it is given: each change of the model is fitted, and recommended only if the verdict or the criterion improves.
 //!
-//! A trial of other functions or nodes starts at the estimates of a fit that is converged and not inadequate. All trials together have the
+//! A trial of other functions or nodes, or of another interpolation, starts at the estimates of a fit that is converged and not inadequate. All trials together have the
 //! iterations of the fit and those that take the time of its assessment, counted at the nodes of its grid; what does not fit into these is
 //! *not tried*. The number of iterations, not the time, is the limit: the same input gives the same advice on every machine.
 
@@ -134,7 +134,9 @@ fn tried(
     let start = (model.problem.functions).start_at(functions, &fit.best.parameters);
     let near = (model.problem.clone()).with(|parts| parts.functions.set_start(&start));
     let level = document.verdict.as_ref().map(|verdict| verdict.level);
-    let of_model = |o: &String| o.starts_with("functions.") || o.starts_with("grid.");
+    let of_model = |o: &String| {
+        o.starts_with("functions.") || o.starts_with("grid.") || o.contains(".force.interpolation=")
+    };
     let is_near = fit.outcome.status == Status::Converged
         && level != Some(VerdictLevel::Inadequate)
         && overrides.iter().all(of_model);
@@ -159,6 +161,9 @@ fn tried(
         return Outcome::Worse;
     };
     let assessment = RunAssessment::of(&found.model, &found.fit);
+    if !assessment.not_done.is_empty() {
+        return Outcome::TooLong;
+    }
     let fitted = FittedModel {
         model: &found.model,
         fit: &found.fit,

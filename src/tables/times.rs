@@ -57,7 +57,7 @@ pub struct ExactTimes {
     pub times: Vec<f64>,
     /// Their step.
     pub step: f64,
-    /// Decimals with which they were printed.
+    /// Decimals with which the largest of them were printed.
     pub digits: usize,
 }
 
@@ -80,13 +80,22 @@ pub fn without_rounding(times: &[f64]) -> Option<ExactTimes> {
     if largest <= SPACING_TOLERANCE * chord || largest > COARSE * chord {
         return None;
     }
+    // Times with as many significant digits are rounded most in the last decade.
+    let largest = first.abs().max(last.abs());
+    let decade = 10f64.powf(largest.log10().floor());
+    let mut coarsest: Vec<f64> = times.to_vec();
+    coarsest.retain(|t| t.abs() >= decade);
+    let coarsest = match coarsest.len() < FEWEST {
+        true => times,
+        false => &coarsest,
+    };
     let is_printed = |digits: &usize| {
         let scale = 10f64.powi(*digits as i32);
         let is_whole = |t: &f64| {
             let whole = t * scale;
             (whole - whole.round()).abs() <= 1e-3f64.max(4.0 * f64::EPSILON * whole.abs())
         };
-        times.iter().all(is_whole)
+        coarsest.iter().all(is_whole)
     };
     let digits = (0..=MOST_DECIMALS).find(is_printed)?;
     let rounding = 10f64.powi(-(digits as i32));
@@ -127,6 +136,10 @@ mod tests {
         let found = without_rounding(&printed(6, &even)).unwrap();
         assert_eq!((found.step, found.digits), (1.0 / 2048.0, 6));
         assert_eq!(found.times[499], even(499));
+        // Seven significant digits.
+        let seven = |i: usize| format!("{:.6e}", i as f64 / 150.0).parse().unwrap();
+        let found = without_rounding(&(0..3000).map(seven).collect::<Vec<f64>>()).unwrap();
+        assert_eq!((found.step, found.digits), (1.0 / 150.0, 5));
         // A clock that jitters by 2 % of a step is none, nor one with exact times.
         let jitter = |i: usize| even(i) + 1e-5 * (7.0 * i as f64).sin();
         assert_eq!(without_rounding(&printed(6, &jitter)), None);

@@ -21,7 +21,7 @@ fn keys_are_explained() {
       type     one of the values below
       needs    `start`
       example  basis: piecewise-linear
-      also     functions.damping.basis, functions.stiffness.basis, functions.quadratic_stiffness.basis, functions.cubic_stiffness.basis and 13 more
+      also     functions.damping.basis, functions.stiffness.basis, functions.quadratic_stiffness.basis, functions.cubic_stiffness.basis and 15 more
 
       nodal               One parameter per node of the grid.
       constant            One constant.

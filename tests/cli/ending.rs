@@ -62,7 +62,7 @@ fn time_limit() {
     assert_eq!(status(&bench, "runs/paper"), "time-limit");
 }
 
-/// Ctrl-C ends a run with the results of the best point.
+/// Ctrl-C ends a run with the results of the best point, which is not assessed.
 #[test]
 #[cfg(unix)]
 fn interrupt() {
@@ -71,6 +71,10 @@ fn interrupt() {
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     let stdout = String::from_utf8_lossy(&output.stdout);
     assert!(stdout.contains("interrupted: "), "{stdout}");
+    assert!(
+        stdout.contains("stopped; not done: step-size check"),
+        "{stdout}"
+    );
     assert_eq!(status(&bench, "runs/paper"), "interrupted");
 }
 

@@ -29,8 +29,8 @@ fn noise(random: &mut ChaCha8Rng, size: f64) -> f64 {
     size * unit
 }
 
-/// Forced vibration at five samples a period of its natural frequency, in steady state: lines lose a tenth of the force. The times have eight digits, from
-/// which no exact rate follows.
+/// Forced vibration at five samples a period of its natural frequency, in steady state: lines lose a tenth of the force, which is no reason to doubt
+/// its stated noise. The times have eight significant digits.
 #[test]
 fn the_loss_by_lines_is_named_at_any_sampling_rate() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -73,6 +73,10 @@ fn the_loss_by_lines_is_named_at_any_sampling_rate() {
         assert!(
             reasons.contains(&"interpolation_loss"),
             "{sigma:?}: {reasons:?}"
+        );
+        assert!(
+            !reasons.contains(&"contradicted_input_sigma"),
+            "{reasons:?}"
         );
     }
 }
@@ -165,6 +169,13 @@ fn a_tone_of_the_system_has_no_other_cause() {
         assert!((found / tone - 1.0).abs() < 0.05, "{found}");
         let advice = kinds(&document["advice"]);
         assert_eq!(advice.contains(&"restrict_band"), is_other, "{advice:?}");
+        let mut all = document["advice"].as_array().expect("advice").iter();
+        if let Some(band) = all.find(|advice| advice["kind"] == "restrict_band") {
+            let set = band["set"][0].as_str().expect("a change");
+            let (_, limit) = set.split_once("band.max=").expect("an upper limit");
+            let limit: f64 = limit.parse().expect("a frequency");
+            assert!((12.0..20.0).contains(&limit), "{set} cuts the system");
+        }
     }
 }
 

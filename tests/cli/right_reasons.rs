@@ -132,6 +132,28 @@ fn a_jump_of_the_force_is_named_and_held() {
     }
 }
 
+/// A force that steps between two samples is late by a part of a spacing. After one event a clock of another rate would explain the
+/// acceleration as well.
+#[test]
+fn a_step_between_samples_is_a_delay() {
+    let (omega, ratio, begin) = (TAU * 6.12, 0.0195, 0.5003);
+    let damped = omega * f64::sqrt(1.0 - ratio * ratio);
+    let mut error = noise(4);
+    let rows = (0..2000).map(|i| {
+        let t = 0.002 * f64::from(i) - begin;
+        let (sine, cosine) = (damped * t).sin_cos();
+        let acceleration = (-ratio * omega * t).exp() * (cosine - ratio * omega / damped * sine);
+        match t > 0.0 {
+            true => vec![30.0, 15.0 * acceleration + error(0.05)],
+            false => vec![0.0, error(0.05)],
+        }
+    });
+    let document = fit(&table("force (N),acceleration (m/s2)", 0.002, rows), &[]);
+    let kinds: Vec<&Value> = reasons(&document).iter().map(|r| &r["kind"]).collect();
+    assert!(has_reason(&document, "delay"), "{kinds:?}");
+    assert!(!has_reason(&document, "clock_difference"), "{kinds:?}");
+}
+
 /// Two modes from 4 to 30 % apart, the weaker one of 10 to 100 % of the other, and one mode alone.
 #[test]
 fn two_modes_are_named_whatever_their_distance() {
@@ -196,8 +218,8 @@ fn a_code_that_is_not_stated_is_named() {
     assert_eq!(document["advice"][0]["tried"], "tried: Adequate");
     let named = reasons(&document)
         .into_iter()
-        .find(|r| r["fault"] == "missing_codes");
-    assert_eq!(named.expect("a reason")["channel"], "acceleration");
+        .find(|r| r["kind"] == "missing_codes");
+    assert_eq!(named.expect("a reason")["channels"][0], "acceleration");
 }
 
 /// A damping that the model fixes at ten times that of the decay, and right ones beside a bias of the sensor.

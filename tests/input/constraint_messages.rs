@@ -421,7 +421,7 @@ fn kinds() {
     assert_snapshot!(message("[{function: mas, min: 0}]"), @"
     m.yaml:11:26: constraints[0].function: unknown choice
       found: `mas`
-      expected: one of: mass, damping, stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force
+      expected: one of: mass, damping, stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force, gap_stiffness
       hint: did you mean `mass`?
     ");
     assert_snapshot!(message("[{function: mass, minimum: 0}]"), @"
@@ -586,7 +586,7 @@ fn equalities() {
     assert_snapshot!(message("[{equal: [mass, dampin]}]"), @"
     m.yaml:11:30: constraints[0].equal[1]: unknown choice
       found: `dampin`
-      expected: one of: mass, damping, stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force
+      expected: one of: mass, damping, stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force, gap_stiffness
       hint: did you mean `damping`?
     ");
     assert_snapshot!(message("[{equal: [mass, damping], ratio: 0}]"), @"

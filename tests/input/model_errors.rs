@@ -97,7 +97,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("  mass: {", "  friction: {"), @"
     m.yaml:14:3: functions: unknown key
       found: `friction`
-      expected: one of: mass, damping, stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force
+      expected: one of: mass, damping, stiffness, quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force, gap_stiffness
     ");
     assert_snapshot!(changed("column: damping", "colunm: damping"), @"
     m.yaml:17:30: functions.damping.start: unknown key

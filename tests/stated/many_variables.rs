@@ -66,14 +66,8 @@ fn file(count: usize) -> Vec<u8> {
 
 #[test]
 fn work_grows_in_proportion() {
-    let folder = tempfile::tempdir().expect("a folder");
     let work = |count: usize| {
-        let path = folder.path().join(format!("{count}.mat"));
-        std::fs::write(&path, file(count)).expect("a file");
-        let source = Source {
-            path,
-            name: "many.mat".to_owned(),
-        };
+        let source = Source::in_memory("many.mat", file(count));
         let before = COUNT.with(Cell::get);
         let found = scaffold(&[source], &Statements::default()).expect("a model");
         assert!(found.text.contains("acceleration: s.acc"), "{}", found.text);

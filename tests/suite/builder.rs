@@ -346,7 +346,7 @@ fn invalid_parts_are_refused_with_their_key() {
         ),
         (
             mass(one().width(1.0)),
-            "functions.mass.width: only Coulomb friction has a width",
+            "functions.mass.width: the mass has no width",
         ),
         (
             mass(one().min(2.0)).constrain(Constraint::Mean { of, value: 1.0 }),

@@ -2,7 +2,7 @@
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::fitting::{ModelFit, fit_model};
-use kmcfit_core::internals::assessment::{FitAssessment, FitWarning};
+use kmcfit_core::internals::assessment::{Doubt, FitAssessment};
 use kmcfit_core::internals::solvers::Observer;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -96,10 +96,10 @@ fn fitted(folder: &Path, width: &str) -> ModelFit {
     fit_model(&model, &mut Observer::new(&mut |_| {})).unwrap()
 }
 
-fn warning(found: &ModelFit) -> Option<FitWarning> {
+fn warning(found: &ModelFit) -> Option<Doubt> {
     let assessment = FitAssessment::of(&found.model.problem, &found.fit, false);
     let mut warnings = assessment.plausibility.warnings.into_iter();
-    warnings.find(|w| matches!(w, FitWarning::FrictionWidth { .. }))
+    warnings.find(|w| matches!(w, Doubt::FrictionWidth { .. }))
 }
 
 /// A wide width is a warning that names an estimate and its shift.
@@ -108,7 +108,7 @@ fn a_wide_width_is_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     write_record(folder.path(), 0, TRUTH[3], NOISE);
     let found = fitted(folder.path(), "0.02");
-    let Some(FitWarning::FrictionWidth {
+    let Some(Doubt::FrictionWidth {
         estimate,
         shift,
         errors: in_errors,

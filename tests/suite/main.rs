@@ -19,3 +19,4 @@ mod pages;
 mod paper;
 mod readme;
 mod records;
+mod stops;

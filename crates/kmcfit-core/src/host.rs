@@ -50,7 +50,7 @@ pub(crate) fn provide_clock() {
 
 /// An instant of the host's clock.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Instant(Duration);
+pub struct Instant(Duration);
 
 impl Instant {
     /// Current time; constant without a host.

@@ -4,12 +4,12 @@
 pub mod assessment {
     pub use crate::assessment::{
         AmplitudeRival, BEYOND_SIGMA, BasisComparison, BasisTest, ClassicalEstimate,
-        ClassicalMethod, CoarseBasis, EXACT, EquationErrorIntervals, Estimate, EstimateErrors,
-        EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics, FitWarning,
-        FunctionSummary, Implausible, LargeCovariance, ModelTests, NoIntervals, POOR, Plausibility,
-        RECOVERY_TOLERANCE, RecordError, ResidualPattern, SampleFault, StepCheck, TruthErrors,
-        Unidentified, VerdictAssumption, VerdictLevel, VerdictReason, all_diagnostics, estimates,
-        function_summaries, outliers, pattern, standard_error, verdict_assumptions, verdict_level,
+        ClassicalMethod, CoarseBasis, Doubt, EXACT, EquationErrorIntervals, Estimate,
+        EstimateErrors, EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics,
+        FunctionSummary, Implausible, LargeCovariance, ModelTests, NoIntervals, POOR, Parts,
+        Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Severity, StepCheck,
+        TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, all_diagnostics, estimates,
+        function_summaries, outliers, pattern, standard_error, verdict_assumptions,
         verdict_reasons,
     };
 }
@@ -40,7 +40,7 @@ pub mod functions {
     };
 }
 pub mod host {
-    pub use crate::host::{Host, set_host};
+    pub use crate::host::{Host, Instant, set_host};
 }
 pub mod identifiability {
     pub use crate::identifiability::{

@@ -108,7 +108,7 @@ pub use solvers::{
     StartStrategy, Status, Stopping, Timings, WeightPath, choose_weight, fit,
 };
 // Inference.
-pub use assessment::{CoarseBasis, FitAssessment, FitWarning, Unidentified};
+pub use assessment::{CoarseBasis, Doubt, FitAssessment, Unidentified};
 pub use identifiability::{Bands, classify_functions, structural_rank};
 pub use study::{Profile, ProfileSettings, Target, profile};
 // Services of the host.

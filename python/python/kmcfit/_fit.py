@@ -93,7 +93,7 @@ class Fit:
     def warnings(self) -> List[str]:
         """Warnings about data, model and identifiability."""
         findings = self.result.get("findings", [])
-        return texts(self.result.get("warnings")) + texts([f for f in findings if f.get("level") == "warning"])
+        return texts(self.result.get("warnings")) + texts([f for f in findings if f.get("level", "note") != "note"])
 
     @property
     def parameters(self) -> Dict[str, float]:

@@ -23,13 +23,15 @@ use super::key_positions::{key_path, locate};
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
+use kmcfit_core::internals::assessment::Severity;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
+use kmcfit_core::internals::host::Instant;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, timed};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Problem, settings and further contents of a model file.
 #[derive(Debug, Clone)]
@@ -294,6 +296,9 @@ fn build_on(
         }
     }
     warnings.extend(built.notices.iter().map(Finding::stated));
+    for warning in &mut warnings {
+        warning.level = warning.level.max(Severity::Warning);
+    }
     let validation = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
     let (own, notes): (Vec<_>, Vec<_>) = notes
         .into_iter()

@@ -21,18 +21,49 @@ pub use roles::Role;
 use sensors::sensors;
 pub use statements::Statements;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Memory for each row beside the table, bytes: times, samples and spectrum. Measured: 150 bytes per row in total for a
 /// million rows of two columns.
 const PER_ROW: u64 = 200;
 
-/// A file of a record: its path, and its name in the model file.
+/// A record: its file, or its content in memory, and its name in the model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
     /// Path.
     pub path: PathBuf,
     /// Name in the model file.
     pub name: String,
+    /// Content in place of the file.
+    pub content: Option<Arc<[u8]>>,
+}
+
+impl Source {
+    /// A file, by its path and its name in the model file.
+    pub fn file(path: impl Into<PathBuf>, name: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            name: name.into(),
+            content: None,
+        }
+    }
+
+    /// A content in memory, by its name in the model file.
+    pub fn in_memory(name: &str, content: impl Into<Arc<[u8]>>) -> Self {
+        Self {
+            content: Some(content.into()),
+            ..Self::file(name, name)
+        }
+    }
+
+    /// All its tables.
+    fn tables(&self) -> Result<Vec<Table>, InputError> {
+        let format = TableFormat::default();
+        match &self.content {
+            Some(content) => Table::parse_all(&self.path, &**content, &format),
+            None => Table::read_all(&self.path, &format),
+        }
+    }
 }
 
 /// A model file and the findings that it is based on.
@@ -80,7 +111,7 @@ fn read<'a>(
     let mut is_used: Vec<bool> = Vec::new();
     let mut records = Vec::new();
     for source in sources {
-        for (table, columns, used) in records_of(&source.path, statements)? {
+        for (table, columns, used) in records_of(source, statements)? {
             memory::check_file(&source.path, table.rows() as u64 * PER_ROW)?;
             is_used = match is_used.is_empty() {
                 true => used,
@@ -177,10 +208,10 @@ fn findings(record: &FileRecord) -> Vec<String> {
 /// The table of a file with its columns: of several sets of channels the only one with times and a measured response, and each run of a
 /// text table with runs side by side.
 fn records_of(
-    path: &Path,
+    source: &Source,
     statements: &Statements,
 ) -> Result<Vec<(Table, ColumnAssignment, Vec<bool>)>, InputError> {
-    let mut tables = Table::read_all(path, &TableFormat::default())?;
+    let mut tables = source.tables()?;
     let has_samples = tables.iter().any(|table| table.rows() > 1);
     tables.retain(|table| !has_samples || table.rows() > 1);
     if let [table] = tables.as_slice() {

@@ -17,7 +17,7 @@ use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, FitStatistics, FunctionSummary, ModelTests, StepCheck,
+    ClassicalEstimate, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
@@ -47,7 +47,7 @@ pub struct ResultDocument {
     /// What the samples, constraints and penalties determine, and warnings: parameters and functions that are not identifiable, and limits of the
     /// confidence intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub findings: Vec<FitFinding>,
+    pub findings: Vec<Finding>,
     /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
     #[serde(default, skip_serializing_if = "Estimates::is_empty")]
     pub estimates: Estimates,
@@ -307,14 +307,22 @@ impl ResultDocument {
 
     /// Findings that are no warnings.
     pub(super) fn notes(&self) -> impl Iterator<Item = &Finding> {
-        let notes = self.findings.iter().filter(|f| !f.level.is_warning());
-        notes.map(|f| &f.finding)
+        self.findings.iter().filter(|f| f.level == Severity::Note)
     }
 
     /// Warnings on identifiability and the confidence intervals.
     pub(super) fn fit_warnings(&self) -> impl Iterator<Item = &Finding> {
-        let warnings = self.findings.iter().filter(|f| f.level.is_warning());
-        warnings.map(|f| &f.finding)
+        self.findings.iter().filter(|f| f.level > Severity::Note)
+    }
+
+    /// Warnings that are no reasons of the verdict, where they stand with the same sentence.
+    pub(super) fn other_warnings<'a>(
+        &'a self,
+        warnings: impl Iterator<Item = &'a Finding>,
+    ) -> Vec<String> {
+        let reasons = self.verdict.as_ref().map_or(&[][..], |v| &v.reasons);
+        let is_other = |text: &String| reasons.iter().all(|reason| reason.text != *text);
+        warnings.map(|w| w.text.clone()).filter(is_other).collect()
     }
 
     /// The first warning of this kind.
@@ -356,33 +364,6 @@ pub struct ExperimentSummary {
     /// Fit of each channel.
     #[serde(default)]
     pub channels: Vec<ChannelSummary>,
-}
-
-/// Level of a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FindingLevel {
-    /// What is determined.
-    Note,
-    /// What is not determined, or a limit of the intervals.
-    Warning,
-}
-
-impl FindingLevel {
-    /// True for a warning.
-    pub fn is_warning(self) -> bool {
-        self == Self::Warning
-    }
-}
-
-/// A finding of a fit with its level.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FitFinding {
-    /// Level.
-    pub level: FindingLevel,
-    /// Kind, quantities and text.
-    #[serde(flatten)]
-    pub finding: Finding,
 }
 
 /// Identifiability: the structural rank, and findings and warnings on functions and ratios. Confidence intervals are

@@ -145,7 +145,7 @@ fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
 fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
     let known = &document.identifiability;
     let notes: Vec<String> = document.notes().map(|f| f.text.clone()).collect();
-    let warnings: Vec<String> = document.fit_warnings().map(|f| f.text.clone()).collect();
+    let warnings = document.other_warnings(document.fit_warnings());
     let mut text = list(&notes) + &list(&warnings);
     text += &match known.assumptions.as_slice() {
         [] => String::new(),

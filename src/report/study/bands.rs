@@ -28,7 +28,7 @@ pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
     };
     let mut notes = bands.notes.clone();
     notes.extend((plausibility.unidentified.iter()).map(|why| findings::unidentified(why).text));
-    notes.extend((plausibility.warnings.iter()).map(|w| findings::warning(w).text));
+    notes.extend((plausibility.warnings.iter()).map(|w| findings::doubt(w).text));
     let ratios = truth.map(Ratios::of);
     let of_ratio = |part: fn(&Ratios) -> &Vec<f64>| ratios.as_ref().map(|r| part(r).as_slice());
     let list = bands.functions.iter().chain(&bands.ratios);

@@ -18,7 +18,9 @@ pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
     // The equation error supports robust losses and bands, but estimates no sensor.
     let is_possible = |pattern: &ResidualPattern| match pattern {
         ResidualPattern::Offset | ResidualPattern::Drift => document.is_simulated(),
-        ResidualPattern::Tone { frequency, .. } => !is_of_system(document, *frequency),
+        ResidualPattern::Tone { frequency, beside } => {
+            !is_of_system(document, *frequency) && band(document, *frequency, *beside).is_some()
+        }
         ResidualPattern::Outliers { .. } => true,
     };
     let pattern = |c: &ChannelSummary| c.pattern.clone().filter(is_possible);
@@ -56,6 +58,19 @@ fn is_of_system(document: &ResultDocument, frequency: f64) -> bool {
     natural.is_some_and(|natural| (frequency - natural).abs() <= width(natural))
 }
 
+/// The end of a band, and its frequency, that parts a tone from the response at `beside` and from the system, whose natural frequency may be
+/// another one; `None` for a tone between these.
+fn band(document: &ResultDocument, tone: f64, beside: f64) -> Option<(&'static str, f64)> {
+    let natural = document.estimates.get("natural_frequency");
+    let natural = natural.map_or(beside, |estimate| estimate.value);
+    let (end, nearest) = match tone > beside {
+        true => ("max", beside.max(natural)),
+        false => ("min", beside.min(natural)),
+    };
+    let is_apart = (tone > beside) == (tone > nearest);
+    is_apart.then(|| (end, (tone * nearest).sqrt()))
+}
+
 fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPattern) -> Suggestion {
     let of = |what: &str, keys: &[&str]| {
         let change = |i: usize| {
@@ -91,8 +106,8 @@ fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPatter
             ),
         ),
         ResidualPattern::Tone { frequency, beside } => {
-            let end = if frequency > beside { "max" } else { "min" };
-            let limit = super::written((frequency * beside).sqrt());
+            let found = band(document, *frequency, *beside);
+            let set = found.map(|(end, limit)| format!("band.{end}={}", super::written(limit)));
             let what = format!(
                 "the residuals oscillate at {} Hz, the response at {} Hz (mains hum or another mode): restrict the frequency band",
                 significant(*frequency, 3),
@@ -100,7 +115,7 @@ fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPatter
             );
             (
                 "restrict_band",
-                of(&what, &[&format!("band.{end}={limit}")]),
+                of(&what, &set.iter().map(String::as_str).collect::<Vec<_>>()),
             )
         }
     };

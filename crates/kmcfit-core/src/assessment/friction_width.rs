@@ -4,7 +4,7 @@
 //! ask for `s` times this change: to first order they are least at the width `w (1 - s/2)`. A width with smaller residuals than its half is
 //! that of the system, and no artefact of the smoothing.
 
-use super::FitWarning;
+use super::Doubt;
 use super::score_tests::SIGNIFICANT;
 use super::span::Span;
 use crate::functions::CoefficientKind;
@@ -25,7 +25,7 @@ pub(super) fn width_warning(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-) -> Option<FitWarning> {
+) -> Option<Doubt> {
     let width = problem.system.friction_width()?;
     let changes = problem.changes_by_width(evaluation)?;
     let better = better_width(problem, evaluation, &changes, width);
@@ -53,7 +53,7 @@ pub(super) fn width_warning(
         }
     };
     let better = better?;
-    (in_errors[worst] > NOTICEABLE || better > width).then(|| FitWarning::FrictionWidth {
+    (in_errors[worst] > NOTICEABLE || better > width).then(|| Doubt::FrictionWidth {
         estimate,
         shift: unit.is_some().then_some(shifts[worst][0]),
         unit: unit.unwrap_or_default(),

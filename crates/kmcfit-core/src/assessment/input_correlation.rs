@@ -10,7 +10,7 @@
 //! for innovations independent of the input (score test; Ljung 1999, section 16.6). The squared multiple correlation `R^2` is the share of
 //! the variance of the innovations that is coherent with the input.
 
-use super::FitWarning;
+use super::Doubt;
 use crate::objective::{Evaluation, channel_fit_percent};
 use crate::problem::Problem;
 use crate::record::{BaseMotion, Channel, Experiment, Loss, Waveform};
@@ -33,7 +33,7 @@ const RANK: f64 = 1e-3;
 const EXACT: f64 = 99.9;
 
 /// The channel whose innovations have the largest share that is coherent with the input of their experiment.
-pub(super) fn coherent_residuals(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
+pub(super) fn coherent_residuals(problem: &Problem, evaluation: &Evaluation) -> Option<Doubt> {
     let experiments = problem.experiments.iter().zip(&evaluation.predictions);
     let all = experiments.flat_map(|(experiment, predictions)| {
         let channels = experiment.channels.iter().zip(predictions);
@@ -44,7 +44,7 @@ pub(super) fn coherent_residuals(problem: &Problem, evaluation: &Evaluation) -> 
         })
     });
     let (share, experiment, channel, input) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(FitWarning::CoherentResiduals {
+    Some(Doubt::CoherentResiduals {
         experiment: experiment.name.clone(),
         channel: channel.kind().name().to_owned(),
         input,
@@ -157,7 +157,7 @@ mod tests {
         let problem = record(&samples);
         let evaluation = problem.evaluate(&[2.0, 3.0, 50.0]).unwrap();
         match coherent_residuals(&problem, &evaluation)? {
-            FitWarning::CoherentResiduals { share, .. } => Some(share),
+            Doubt::CoherentResiduals { share, .. } => Some(share),
             other => panic!("{other:?}"),
         }
     }

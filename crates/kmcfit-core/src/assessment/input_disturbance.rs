@@ -11,7 +11,7 @@
 //! autoregressive noise of the fit by the Bayesian information criterion. A noisy sensor, an unmeasured drive and a term missing
 //! from the equation leave such residuals alike.
 
-use super::FitWarning;
+use super::Doubt;
 use super::input_correlation::measured;
 use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
 use crate::noise::Correlation;
@@ -40,7 +40,7 @@ const TOLERANCE: f64 = 0.01;
 const MOST_SAMPLES: usize = 20_000;
 
 /// Warnings about the inputs of all experiments.
-pub(super) fn input_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+pub(super) fn input_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<Doubt> {
     if problem.parameters() > FEW_PARAMETERS {
         return Vec::new();
     }
@@ -48,7 +48,7 @@ pub(super) fn input_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<
     each.collect()
 }
 
-fn warning(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<FitWarning> {
+fn warning(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<Doubt> {
     let experiment = &problem.experiments[e];
     let [channel] = experiment.channels.as_slice() else {
         return None;
@@ -70,7 +70,7 @@ fn contradicted(
     channel: &Channel,
     residuals: &[f64],
     error: &InputError,
-) -> Option<FitWarning> {
+) -> Option<Doubt> {
     let effect = channel.correlation().and_then(Correlation::input_errors)?;
     let count = residuals.len().min(MOST_SAMPLES);
     let sigma = channel.weighting().sigma(0)?;
@@ -84,7 +84,7 @@ fn contradicted(
     let ratio = log.exp();
     let is_significant = minus_two_log(0.0) - least > SIGNIFICANT;
     let is_far = !(1.0 / CONTRADICTED..=CONTRADICTED).contains(&ratio);
-    (is_significant && is_far).then(|| FitWarning::ContradictedInputSigma {
+    (is_significant && is_far).then(|| Doubt::ContradictedInputSigma {
         experiment: experiment.name.clone(),
         input: error.quantity,
         given: error.sigma,
@@ -98,7 +98,7 @@ fn disturbed(
     evaluation: &Evaluation,
     e: usize,
     residuals: &[f64],
-) -> Option<FitWarning> {
+) -> Option<Doubt> {
     let experiment = &problem.experiments[e];
     let channel = &experiment.channels[0];
     let is_judged = channel.weighting().is_sigma()
@@ -127,7 +127,7 @@ fn disturbed(
             n * mean_square(&innovations).ln() + correlation.log_determinant() + order * n.ln()
         }
     };
-    let effect = input_error_effect(problem, evaluation, e, channel, &error);
+    let effect = input_error_effect(problem, evaluation, e, channel, &error, count);
     // The sigma of the channel is profiled: that of the input is the ratio times it.
     let unit = rms(residuals);
     let of_share = |share: f64| effect.likelihood(share * size / unit, residuals);
@@ -139,7 +139,7 @@ fn disturbed(
     let share = log.exp();
     let as_disturbance = least + n.ln();
     let scale = (of_share(share)[0] / n).sqrt() / unit;
-    (as_noise - as_disturbance > EVIDENCE).then(|| FitWarning::DisturbedInput {
+    (as_noise - as_disturbance > EVIDENCE).then(|| Doubt::DisturbedInput {
         experiment: experiment.name.clone(),
         input: quantity,
         sigma: share * scale * size,

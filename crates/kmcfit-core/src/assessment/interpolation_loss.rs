@@ -7,13 +7,14 @@
 //!
 //! White residuals show that the input is as interpolated, unless errors of the input are stated, which whiten what an interpolation leaves.
 
-use super::FitWarning;
+use super::Doubt;
 use super::input_correlation::measured;
 use super::median_frequency::median_frequency;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{BaseMotion, Input, Waveform};
 use crate::signal::{Interpolation, Signal, median_spacing};
+use crate::simd::sum::rms;
 use crate::system::InputQuantity;
 use std::f64::consts::PI;
 
@@ -26,7 +27,7 @@ pub(super) fn interpolation_losses(
     theta: &[f64],
     evaluation: &Evaluation,
     is_white: bool,
-) -> Vec<FitWarning> {
+) -> Vec<Doubt> {
     let frequency = median_frequency(problem, evaluation);
     let each = problem.experiments.iter().enumerate();
     let each = each.filter_map(|(e, experiment)| {
@@ -34,7 +35,7 @@ pub(super) fn interpolation_losses(
         let (input, cubic) = is_open.then(|| with_cubics(problem, e)).flatten()?;
         let cycles = frequency? * median_spacing(cubic.times());
         let errors = shift_by(problem, theta, evaluation, e, (input, cubic))?;
-        (errors > NOTICEABLE).then(|| FitWarning::InterpolationLoss {
+        (errors > NOTICEABLE).then(|| Doubt::InterpolationLoss {
             experiment: experiment.name.clone(),
             input,
             share: 1.0 - passed(cycles),
@@ -42,6 +43,36 @@ pub(super) fn interpolation_losses(
         })
     });
     each.collect()
+}
+
+/// True for a sigma of an input that the residuals contradict by no more than what the lines between its samples lose.
+pub(super) fn is_loss(problem: &Problem, losses: &[Doubt], warning: &Doubt) -> bool {
+    let Doubt::ContradictedInputSigma {
+        experiment: name,
+        input: quantity,
+        given,
+        likely,
+    } = warning
+    else {
+        return false;
+    };
+    let lost = losses.iter().find_map(|loss| match loss {
+        Doubt::InterpolationLoss {
+            experiment,
+            input,
+            share,
+            ..
+        } => (experiment == name && input == quantity).then_some(*share),
+        _ => None,
+    });
+    let mut experiments = problem.experiments.iter();
+    let experiment = experiments.find(|experiment| experiment.name == *name);
+    let size = || {
+        let excitation = experiment?.excitation.as_ref()?;
+        Some(rms(&excitation.quantity(*quantity)?.at_nodes()))
+    };
+    let most = lost.and_then(|share| Some(given.hypot(share * size()?)));
+    most.is_some_and(|most| (*given..most).contains(likely))
 }
 
 /// The evaluation with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.

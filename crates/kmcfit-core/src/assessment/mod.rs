@@ -4,6 +4,7 @@ mod assumptions;
 mod channel;
 mod classical;
 mod constants;
+mod doubt;
 mod equation_error;
 mod estimates;
 mod extension;
@@ -19,6 +20,7 @@ mod large_covariance;
 mod median_frequency;
 mod minimum;
 mod model_tests;
+mod parts;
 mod plausibility;
 mod record_error;
 mod record_errors;
@@ -36,34 +38,34 @@ mod statistics;
 mod step_check;
 mod variation;
 mod verdict;
-mod warning;
 
 pub use crate::objective::{all_diagnostics, outliers};
 pub use assumptions::{VerdictAssumption, verdict_assumptions};
 pub use channel::{ResidualPattern, pattern};
 pub use classical::{ClassicalEstimate, ClassicalMethod};
 pub use constants::{constant_probability, standard_error};
+pub use doubt::{Doubt, Severity, Unidentified};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
 pub use large_covariance::LargeCovariance;
 pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
-pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility, Unidentified};
+pub use parts::Parts;
+pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility};
 pub use record_error::RecordError;
 pub use recovery::{RECOVERY_TOLERANCE, TruthErrors};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome};
-pub use verdict::{SampleFault, VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
-pub use warning::FitWarning;
+pub use verdict::{VerdictLevel, verdict_reasons};
 
 use classical::classical_estimate;
 use friction_width::width_warning;
 use input_jumps::{connected_jump, or_jump};
 use input_pulses::input_pulses;
-use interpolation_loss::interpolation_losses;
+use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
 use rivals::amplitude_rival;
 use score_tests::{ScoreTests, missing};
@@ -75,9 +77,10 @@ use crate::identifiability::{
     Bands, FunctionClassification, Means, classify_functions, condition_on_bases,
     condition_on_inputs, condition_on_time,
 };
+use crate::objective::Refined;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
-use crate::threads::{analyses_at_once, both};
+use crate::threads::{analyses_at_once, both, is_stopped};
 use nalgebra::DMatrix;
 
 /// Results of both analyses, which are computed at the same time for all but the longest records.
@@ -117,6 +120,8 @@ pub struct FitAssessment {
     pub classical: Option<ClassicalEstimate>,
     /// Tests against larger models.
     pub model_tests: ModelTests,
+    /// Parts that a request to end left out.
+    pub not_done: Vec<&'static str>,
 }
 
 impl FitAssessment {
@@ -129,8 +134,10 @@ impl FitAssessment {
         // Causes and classical estimates are those of one coordinate.
         let is_one = problem.system.structure.is_one();
         let has_causes = reports_errors && is_one && fit.outcome.status != Status::Failed;
-        let plausibility = || {
-            let halved = problem.on_half_step(&best.evaluation);
+        let mut parts = Parts::default();
+        let plausibility = |parts: &mut Parts| {
+            let halved = parts.part("step-size check", || problem.on_half_step(&best.evaluation));
+            let halved = halved.unwrap_or(Ok(None));
             let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
             let step_check: StepCheckOutcome = match &halved {
                 Ok(refined) => Ok(refined.as_ref().map(check)),
@@ -143,10 +150,11 @@ impl FitAssessment {
         };
         let score_tests = || {
             let at = || ScoreTests::at(problem, &best.parameters, &best.evaluation);
-            (has_causes && tests_bases).then(at).flatten()
+            let applies = has_causes && tests_bases && !is_stopped();
+            applies.then(at).flatten()
         };
         let ((halved, step_check, statistics, mut plausibility), score_tests) =
-            at_once(problem, plausibility, score_tests);
+            at_once(problem, || plausibility(&mut parts), score_tests);
         if fit.outcome.status == Status::Failed {
             plausibility.fail();
         }
@@ -166,84 +174,115 @@ impl FitAssessment {
                 p_limit: refinement::LEVEL,
                 ..ModelTests::default()
             },
+            not_done: Vec::new(),
         };
         if has_causes {
             let (plausibility, tests) = (&assessment.plausibility, score_tests.as_ref());
-            let (causes, tests) = causes(problem, fit, plausibility, tests_bases, tests);
+            let found = parts.part("tests of what the model lacks", || {
+                causes(problem, fit, plausibility, tests_bases, tests)
+            });
+            let (causes, tests) = found.unwrap_or_default();
             assessment.plausibility.warnings.extend(causes);
             assessment.model_tests.extensions = tests;
         }
         // Its Jacobian is as large as those that follow.
         drop(score_tests);
         if reports_errors && assessment.plausibility.errors_hold {
-            let (theta, evaluation) = (&best.parameters, &best.evaluation);
-            let is_coloured = assessment.plausibility.is_coloured;
-            let (bands, test) = at_once(
-                problem,
-                || Bands::beside(problem, theta, evaluation, halved.ok().flatten()),
-                || match tests_bases && !is_coloured {
-                    true => BasisTest::of(problem, theta, evaluation),
-                    false => BasisTest::default(),
-                },
-            );
-            assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
-            let is_white = !is_coloured && !assessment.plausibility.is_disturbed;
-            let losses = match is_one {
-                true => interpolation_losses(problem, theta, evaluation, is_white),
-                false => Vec::new(),
-            };
-            assessment.plausibility.warnings.extend(losses);
-            let may_vary = may_vary(&assessment.plausibility);
-            if may_vary {
-                condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
-            }
-            if !test.comparisons.is_empty() {
-                assessment.model_tests.p_limit = test.level;
-                assessment.model_tests.bases = test.comparisons;
-            }
-            if assessment.plausibility.is_disturbed {
-                condition_on_inputs(&mut assessment.classifications);
-            }
-            if !problem.penalties.is_empty() {
-                assessment.effective_parameters = problem.effective_parameters(theta, evaluation);
-            }
-            let effective = assessment.effective_parameters.as_deref();
-            let covariance = bands.covariance.as_ref().filter(|_| tests_bases);
-            let rival = || amplitude_rival(problem, theta, evaluation, covariance, effective);
-            let rival = is_one.then(rival).flatten();
-            if let Some(rival) = rival {
-                condition_on_time(problem, &mut assessment.classifications, &rival.indices);
-                (assessment.plausibility.warnings).push(FitWarning::TimeOrAmplitude(rival));
-            }
-            let coarse = test.coarse.into_iter().filter(|_| may_vary);
-            let warnings = coarse.map(FitWarning::CoarseBasis);
-            assessment.plausibility.warnings.extend(warnings);
-            assessment
-                .degrees_of_freedom
-                .clone_from(&bands.degrees_of_freedom);
-            assessment.covariance = bands.covariance.clone();
-            assessment.bands = Some(bands);
+            let halved = halved.ok().flatten();
+            assessment.add_errors(problem, fit, tests_bases, halved, &mut parts);
         } else if !few
             && assessment.plausibility.errors_hold
             && !assessment.plausibility.is_coloured
         {
-            assessment.large_covariance =
-                LargeCovariance::of(problem, &best.parameters, &best.evaluation);
+            let large = || LargeCovariance::of(problem, &best.parameters, &best.evaluation);
+            assessment.large_covariance = parts.part("confidence intervals", large).flatten();
         }
         if is_one && fit.outcome.status != Status::Failed {
-            let (bands, effective) = (
-                assessment.bands.as_ref(),
-                assessment.effective_parameters.as_deref(),
-            );
-            let varying = variation_warnings(problem, &best.evaluation, bands, effective);
+            let bands = assessment.bands.as_ref();
+            let effective = assessment.effective_parameters.as_deref();
+            let found = parts.part("classical estimate", || {
+                let varying = variation_warnings(problem, &best.evaluation, bands, effective);
+                (
+                    varying,
+                    classical_estimate(problem, &best.evaluation, bands),
+                )
+            });
+            let (varying, classical) = found.unwrap_or_default();
             assessment.plausibility.warnings.extend(varying);
-            assessment.classical =
-                classical_estimate(problem, &best.evaluation, assessment.bands.as_ref());
+            assessment.classical = classical;
         }
         let disagrees = assessment.classical.iter().filter(|c| !c.agrees).cloned();
-        let disagrees = disagrees.map(FitWarning::ClassicalDisagrees);
+        let disagrees = disagrees.map(Doubt::ClassicalDisagrees);
         assessment.plausibility.warnings.extend(disagrees);
+        assessment.not_done = parts.not_done;
         assessment
+    }
+
+    /// Adds covariance, bands and classifications, and with `tests_bases` the test of the bases against finer ones.
+    fn add_errors(
+        &mut self,
+        problem: &Problem,
+        fit: &Fit,
+        tests_bases: bool,
+        halved: Option<Refined>,
+        parts: &mut Parts,
+    ) {
+        let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
+        let is_one = problem.system.structure.is_one();
+        let is_coloured = self.plausibility.is_coloured;
+        let found = parts.part("confidence intervals", || {
+            at_once(
+                problem,
+                || Bands::beside(problem, theta, evaluation, halved),
+                || match tests_bases && !is_coloured {
+                    true => BasisTest::of(problem, theta, evaluation),
+                    false => BasisTest::default(),
+                },
+            )
+        });
+        let Some((bands, test)) = found else {
+            return;
+        };
+        self.classifications = classify_functions(problem, evaluation, &bands);
+        let is_white = !is_coloured && !self.plausibility.is_disturbed;
+        if is_one {
+            let losses = parts.part("loss by interpolation", || {
+                interpolation_losses(problem, theta, evaluation, is_white)
+            });
+            let losses = losses.unwrap_or_default();
+            let warnings = &mut self.plausibility.warnings;
+            warnings.retain(|warning| !is_loss(problem, &losses, warning));
+            warnings.extend(losses);
+        }
+        let may_vary = may_vary(&self.plausibility);
+        if may_vary {
+            condition_on_bases(problem, &mut self.classifications, &test.doubtful);
+        }
+        if !test.comparisons.is_empty() {
+            self.model_tests.p_limit = test.level;
+            self.model_tests.bases = test.comparisons;
+        }
+        if self.plausibility.is_disturbed {
+            condition_on_inputs(&mut self.classifications);
+        }
+        if !problem.penalties.is_empty() {
+            self.effective_parameters = problem.effective_parameters(theta, evaluation);
+        }
+        let effective = self.effective_parameters.as_deref();
+        let covariance = bands.covariance.as_ref().filter(|_| tests_bases);
+        let rival = || amplitude_rival(problem, theta, evaluation, covariance, effective);
+        let rival = is_one.then(|| parts.part("time or amplitude", rival));
+        if let Some(rival) = rival.flatten().flatten() {
+            condition_on_time(problem, &mut self.classifications, &rival.indices);
+            (self.plausibility.warnings).push(Doubt::TimeOrAmplitude(rival));
+        }
+        let coarse = test.coarse.into_iter().filter(|_| may_vary);
+        let warnings = coarse.map(Doubt::CoarseBasis);
+        self.plausibility.warnings.extend(warnings);
+        self.degrees_of_freedom
+            .clone_from(&bands.degrees_of_freedom);
+        self.covariance = bands.covariance.clone();
+        self.bands = Some(bands);
     }
 
     /// Means over the record with their standard errors, where these are meaningful.
@@ -272,18 +311,18 @@ fn is_constant(function: &CoefficientFunction) -> bool {
 /// True where a finer basis that fits better may mean that a coefficient varies: no other test explains the residuals. Correlated residuals are
 /// not tested: what leaves them also makes constants seem to vary.
 fn may_vary(plausibility: &Plausibility) -> bool {
-    let explains = |warning: &FitWarning| {
+    let explains = |warning: &Doubt| {
         matches!(
             warning,
-            FitWarning::DisturbedInput { .. }
-                | FitWarning::ContradictedInputSigma { .. }
-                | FitWarning::InterpolationLoss { .. }
-                | FitWarning::CoherentResiduals { .. }
-                | FitWarning::MissingTerm(_)
-                | FitWarning::SecondMode { .. }
-                | FitWarning::ResidualMean { .. }
-                | FitWarning::FrictionWidth { .. }
-                | FitWarning::RecordError(_)
+            Doubt::DisturbedInput { .. }
+                | Doubt::ContradictedInputSigma { .. }
+                | Doubt::InterpolationLoss { .. }
+                | Doubt::CoherentResiduals { .. }
+                | Doubt::MissingTerm(_)
+                | Doubt::SecondMode { .. }
+                | Doubt::ResidualMean { .. }
+                | Doubt::FrictionWidth { .. }
+                | Doubt::RecordError(_)
         )
     };
     !plausibility.warnings.iter().any(explains)
@@ -297,21 +336,21 @@ fn causes(
     plausibility: &Plausibility,
     tests: bool,
     score_tests: Option<&ScoreTests<'_>>,
-) -> (Vec<FitWarning>, Vec<ExtensionTest>) {
+) -> (Vec<Doubt>, Vec<ExtensionTest>) {
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
     let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
     let is_modelled = is_noise && !plausibility.is_disturbed;
     let is_system = plausibility.unidentified.is_none();
     // A width of friction on which estimates depend leaves residuals like those of a missing term.
     let width = is_system.then(|| width_warning(problem, theta, evaluation));
-    let large = || large_error(problem, theta, evaluation).map(FitWarning::RecordError);
+    let large = || large_error(problem, theta, evaluation).map(Doubt::RecordError);
     let pulses = || {
         let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
-        Some(FitWarning::RecordError(or_jump(problem, found)))
+        Some(Doubt::RecordError(or_jump(problem, found)))
     };
     let jump = || {
         let found = connected_jump(problem, theta, evaluation).filter(|_| is_system);
-        found.map(FitWarning::RecordError)
+        found.map(Doubt::RecordError)
     };
     match (width.flatten(), tests) {
         (Some(width), _) => (vec![width], Vec::new()),

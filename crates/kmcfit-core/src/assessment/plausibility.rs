@@ -1,6 +1,6 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
-use super::FitWarning;
+use super::doubt::{Doubt, Unidentified};
 use super::input_correlation::coherent_residuals;
 use super::input_disturbance::input_warnings;
 use super::median_frequency::median_frequency;
@@ -12,9 +12,7 @@ use crate::objective::{Evaluation, all_diagnostics, channel_fit_percent};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, ScoreCovariance, Weighting};
 use crate::signal::median;
-use crate::step::SimulationError;
 use crate::system::Excitation;
-use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Largest change of the predictions by halving the step, as a share of the largest sample; beyond it the step-size error
@@ -45,33 +43,13 @@ const PERIODS_PER_SAMPLE: f64 = 0.4;
 /// Largest deviation of equally spaced samples from their grid, as a share of the spacing.
 const EVEN: f64 = 0.01;
 
-/// Reason for which an optimum identifies no system.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Unidentified {
-    /// The fit failed.
-    Failed,
-    /// The simulation with half the step fails.
-    NoResponseOnHalfStep {
-        /// Error of the simulation.
-        #[serde(skip)]
-        error: SimulationError,
-    },
-    /// Halving the step changes the response by more than a tenth of the largest sample.
-    StepDependent,
-    /// The residuals of all channels exceed twice the variation of their samples.
-    Unrelated,
-    /// Noise of the size of the samples would be matched equally well.
-    Noise,
-}
-
 /// Plausibility of a fit.
 #[derive(Debug, Clone)]
 pub struct Plausibility {
     /// Reason for which the optimum identifies no system, if any.
     pub unidentified: Option<Unidentified>,
     /// Warnings.
-    pub warnings: Vec<FitWarning>,
+    pub warnings: Vec<Doubt>,
     /// True if the standard errors of the linearised fit are meaningful.
     pub errors_hold: bool,
     /// True if the residuals of a channel are certainly not white, so that standard errors are too small.
@@ -99,23 +77,27 @@ impl Plausibility {
         let (coloured, poor) = coloured_and_poor(problem, &residuals, reports_errors);
         let unexplained = unexplained(problem, evaluation)
             .or_else(|| coarse(problem, evaluation, step_check))
-            .or_else(|| poor.then_some(FitWarning::PoorFit));
+            .or_else(|| {
+                let fits = residuals.iter().flatten().map(|found| found.fit_percent);
+                let fit_percent = fits.fold(100.0, f64::min);
+                poor.then_some(Doubt::PoorFit { fit_percent })
+            });
         let aliased = aliased(problem, evaluation);
         let errors_hold = unidentified.is_none() && unexplained.is_none() && aliased.is_none();
         let inputs = match errors_hold && reports_errors {
             true => input_warnings(problem, evaluation),
             false => Vec::new(),
         };
-        let is_disturbed = (inputs.iter()).any(|w| matches!(w, FitWarning::DisturbedInput { .. }));
+        let is_disturbed = (inputs.iter()).any(|w| matches!(w, Doubt::DisturbedInput { .. }));
         // Stated errors of an input, and those that the residuals show, explain the correlation.
         let is_estimated =
             |c: &Channel| c.correlation().is_some_and(|c| c.input_errors().is_none());
         let is_correlated = !is_disturbed && problem.channels().any(is_estimated);
         let optimistic = match (errors_hold, coloured, is_correlated) {
-            (true, true, _) => Some(FitWarning::Coloured {
+            (true, true, _) => Some(Doubt::Coloured {
                 covariance: score_covariance(problem),
             }),
-            (true, false, true) => Some(FitWarning::Correlated),
+            (true, false, true) => Some(Doubt::Correlated),
             _ => None,
         };
         // Coloured residuals, and errors of the input itself, have their own warnings.
@@ -237,7 +219,7 @@ fn coarse(
     problem: &Problem,
     evaluation: &Evaluation,
     step_check: &StepCheckOutcome,
-) -> Option<FitWarning> {
+) -> Option<Doubt> {
     let half = step_check.as_ref().ok()?.as_ref()?;
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
@@ -245,11 +227,11 @@ fn coarse(
     // Samples simulated with these steps are matched to machine precision.
     let is_exact = fits.all(|fit| fit > EXACT);
     let times = half.change_per_residual;
-    (times > 1.0 && !is_exact).then_some(FitWarning::CoarseSteps { times })
+    (times > 1.0 && !is_exact).then_some(Doubt::CoarseSteps { times })
 }
 
 /// Warnings about implausible optima.
-fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<Doubt> {
     let mut warnings = Vec::new();
     let sizes = problem.natural_scales(evaluation);
     let passive = [
@@ -266,7 +248,7 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         let function = problem.functions.get(f);
         let is_negative = median(values) < -NEGATIVE * sizes[f];
         if is_negative && function.parameters() > 0 && passive.contains(&function.quantity) {
-            warnings.push(FitWarning::Negative {
+            warnings.push(Doubt::Negative {
                 function: function.name(),
             });
         }
@@ -283,7 +265,7 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         let inertia = response.velocity(0).windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
-            warnings.push(FitWarning::NegligibleForce {
+            warnings.push(Doubt::NegligibleForce {
                 experiment: experiment.name.clone(),
             });
         }
@@ -294,7 +276,7 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
 /// Warning where the residuals of a channel exceed its stated sigma, so that standard errors are too small. Each channel is judged by itself,
 /// whatever penalties, bounds and other channels do to the degrees of freedom: by the root mean square of its innovations over sigma, and
 /// with a robust loss, which outliers may exceed, by the median of their sizes over that of a normal distribution.
-fn unexplained(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
+fn unexplained(problem: &Problem, evaluation: &Evaluation) -> Option<Doubt> {
     let times_sigma = |(channel, predicted): (&Channel, &Vec<f64>)| match channel.weighting() {
         Weighting::Sigma(_) | Weighting::Sigmas(_) if channel.loss() == Loss::Squares => {
             (channel.cost(predicted) / channel.len() as f64).sqrt()
@@ -308,13 +290,13 @@ fn unexplained(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning>
     };
     let times = problem.predicted(evaluation).map(times_sigma);
     let times = times.fold(0.0, f64::max);
-    (times > BEYOND_SIGMA).then_some(FitWarning::BeyondSigma { times })
+    (times > BEYOND_SIGMA).then_some(Doubt::BeyondSigma { times })
 }
 
 /// Warning for a system whose frequency is too high for the sampling: equally spaced samples of one kind of a free response of
 /// frequency `f` equal those of a frequency `1/spacing - f`. Unequal spacing, a force, or a second kind of samples remove the
 /// ambiguity; then `None`.
-fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
+fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<Doubt> {
     let mut channels = problem.channels();
     let first = channels.next()?;
     let spacing = raster(first)?;
@@ -330,7 +312,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     }
     // Median over time, because k/m may be arbitrary at the ends of a record.
     let frequency = median_frequency(problem, evaluation)?;
-    (frequency * spacing > PERIODS_PER_SAMPLE).then(|| FitWarning::Aliased {
+    (frequency * spacing > PERIODS_PER_SAMPLE).then(|| Doubt::Aliased {
         per_period: 1.0 / (frequency * spacing),
         frequency,
     })

@@ -54,6 +54,10 @@ pub(super) fn small_error(
             fitted.is_white().then(|| delay(problem, e, clock))
         }
         RecordParameter::Rate(e) => {
+            // After a single event, such as a step, a rate is as good as a delay.
+            if let Some(delay) = small_error(problem, theta, RecordParameter::Delay(e), 0.0) {
+                return Some(delay);
+            }
             let clock = Clock {
                 delay: 0.0,
                 rate: value,

@@ -9,7 +9,7 @@
 //! with the [kernel covariance](KernelCovariance) `S` of the sum of `e_i - r`. The noise model of the fit gives no error here, because an
 //! autoregressive process takes up the mean itself.
 
-use super::FitWarning;
+use super::Doubt;
 use crate::diagnostics::{outlier_indices, standard_deviation};
 use crate::functions::CoefficientKind;
 use crate::noise::KernelCovariance;
@@ -28,7 +28,7 @@ const ROUNDING: f64 = 1e-6;
 const FEWEST: usize = 50;
 
 /// Warnings about channels with a sigma whose sensor offset is not estimated.
-pub(super) fn mean_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+pub(super) fn mean_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<Doubt> {
     let mut warnings = Vec::new();
     for (experiment, predictions) in problem.experiments.iter().zip(&evaluation.predictions) {
         let set = problem
@@ -43,7 +43,7 @@ pub(super) fn mean_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<F
                 continue;
             }
             if let Some([mean, t, share]) = mean_of(channel, predicted) {
-                warnings.push(FitWarning::ResidualMean {
+                warnings.push(Doubt::ResidualMean {
                     experiment: experiment.name.clone(),
                     channel: channel.kind().name().to_owned(),
                     mean,

@@ -12,7 +12,7 @@
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
 //! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_parameters). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
-use super::FitWarning;
+use super::Doubt;
 use super::extension::extended;
 use super::interpolation_loss::evaluation_with_cubics;
 use super::model_tests::{Extension, ExtensionTest};
@@ -167,7 +167,7 @@ pub(super) fn missing(
     evaluation: &Evaluation,
     tests: Option<&ScoreTests<'_>>,
     is_modelled: bool,
-) -> (Option<FitWarning>, Vec<ExtensionTest>) {
+) -> (Option<Doubt>, Vec<ExtensionTest>) {
     let tests = tests.map_or_else(Vec::new, |tests| tests.results(theta, is_modelled));
     let results = tests.iter().map(|(candidate, value, t)| ExtensionTest {
         extension: candidate.extension(problem),
@@ -184,7 +184,7 @@ fn most_significant(
     theta: &[f64],
     evaluation: &Evaluation,
     mut tests: Vec<(Candidate, f64, f64)>,
-) -> Option<FitWarning> {
+) -> Option<Doubt> {
     tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
     // Far from the optimum of the right candidate another one may be more significant: friction resembles a negative quadratic damping.
     let mut best: Option<(f64, MissingTerm)> = None;
@@ -207,7 +207,7 @@ fn most_significant(
                     continue;
                 };
                 if refit.is_white() {
-                    return Some(FitWarning::MissingTerm(missing));
+                    return Some(Doubt::MissingTerm(missing));
                 }
                 let misfit = refit.worst_misfit();
                 if best.is_none_or(|(least, _)| misfit < least) {
@@ -217,14 +217,14 @@ fn most_significant(
             Candidate::Record(parameter) => {
                 let error = small_error(problem, theta, parameter, value);
                 if let Some(error) = error {
-                    return Some(FitWarning::RecordError(error));
+                    return Some(Doubt::RecordError(error));
                 }
             }
         }
     }
     let before = worst_misfit(problem, evaluation);
     let (_, missing) = best.filter(|(misfit, _)| *misfit < EXPLAINED * before)?;
-    Some(FitWarning::MissingTerm(missing))
+    Some(Doubt::MissingTerm(missing))
 }
 
 /// Refit with a term, from the optimum or else from the start, whichever ends lower. The term is missing if it leaves white residuals: an error

@@ -11,7 +11,7 @@
 //! Marquardt (variable projection, Golub and Pereyra 1973, with the derivatives of the residuals by Kaufman 1975). Two modes are named where they explain the samples better than the model and its
 //! noise by the Bayesian information criterion, their residuals are white or much smaller, and their frequencies are apart.
 
-use super::FitWarning;
+use super::Doubt;
 use super::rivals::{fit_of_constants, penalty_freedom};
 use crate::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use crate::functions::Ratios;
@@ -62,7 +62,7 @@ pub(super) fn second_modes(
     problem: &Problem,
     evaluation: &Evaluation,
     residuals: &[Vec<ResidualDiagnostics>],
-) -> Vec<FitWarning> {
+) -> Vec<Doubt> {
     warnings(problem, evaluation, residuals, |_| f64::INFINITY)
 }
 
@@ -72,7 +72,7 @@ pub(super) fn second_modes_in_place(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-) -> Vec<FitWarning> {
+) -> Vec<Doubt> {
     let constants = || {
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
         let (constants, fit) = few.then(|| fit_of_constants(problem, theta, evaluation))??;
@@ -111,14 +111,14 @@ fn warnings(
     evaluation: &Evaluation,
     residuals: &[Vec<ResidualDiagnostics>],
     beside: impl Fn(usize) -> f64,
-) -> Vec<FitWarning> {
+) -> Vec<Doubt> {
     if problem.parameters() > FEW_PARAMETERS {
         return Vec::new();
     }
     let each = (0..problem.experiments.len()).filter_map(|e| {
         let (frequencies, gain) = second_mode(problem, evaluation, e, residuals[e].first()?)?;
         (gain + beside(e) > 0.0).then_some(())?;
-        Some(FitWarning::SecondMode {
+        Some(Doubt::SecondMode {
             experiment: problem.experiments[e].name.clone(),
             frequencies,
         })

@@ -4,7 +4,7 @@
 //! offset of 0.4 % and a third harmonic of 0.3 % of a ring-down changed the damping ratio by 25 %, four times its interval; with one knot in
 //! two periods, or a constant, the intervals held.
 
-use super::FitWarning;
+use super::Doubt;
 use super::median_frequency::median_frequency;
 use crate::identifiability::Bands;
 use crate::objective::Evaluation;
@@ -27,7 +27,7 @@ pub(super) fn variation_warnings(
     evaluation: &Evaluation,
     bands: Option<&Bands>,
     effective: Option<&[f64]>,
-) -> Vec<FitWarning> {
+) -> Vec<Doubt> {
     let Some(frequency) = median_frequency(problem, evaluation) else {
         return Vec::new();
     };
@@ -48,14 +48,14 @@ pub(super) fn variation_warnings(
         if beside_mean > LINE.max(MOST_PER_PERIOD * periods) {
             fast.push((function.name(), freedom.unwrap_or(1.0) / periods));
         } else if let Some(cycles) = bands.and_then(|bands| cycles(bands, f)) {
-            warnings.push(FitWarning::Oscillates {
+            warnings.push(Doubt::Oscillates {
                 function: function.name(),
                 frequency: cycles as f64 / problem.system.grid.duration(),
             });
         }
     }
     let per_period = fast.iter().map(|(_, n)| *n).reduce(f64::max);
-    warnings.extend(per_period.map(|per_period| FitWarning::FastVariation {
+    warnings.extend(per_period.map(|per_period| Doubt::FastVariation {
         functions: fast.into_iter().map(|(name, _)| name).collect(),
         per_period,
     }));

@@ -1,18 +1,14 @@
 //! Correlation of the noise of one channel, and whitening.
 
 use super::autoregression::Autoregression;
+use super::gaps::{Gaps, Predictor};
 use super::input_errors::InputErrors;
 use crate::signal::median;
-use nalgebra::DMatrix;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Largest deviation of a spacing of samples from the smallest one, as a share of it, for which samples are equally spaced.
 const UNEVEN: f64 = 0.01;
-/// Number of spacings across which noise counts as independent.
-const LONGEST_GAP: usize = 1000;
-
 /// Law of the correlation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CorrelationLaw {
@@ -38,16 +34,8 @@ pub struct Correlation {
     /// Predictors of samples that an ordinary predictor does not reach, in the order of the samples: of all but the first
     /// for the exponential law, of the first `p` samples after each gap for an autoregressive one.
     predictors: Vec<Predictor>,
-}
-
-/// Best linear predictor of one sample from those before it.
-#[derive(Debug, Clone, PartialEq)]
-struct Predictor {
-    sample: usize,
-    /// Coefficients of the samples before it, the last first.
-    coefficients: Vec<f64>,
-    /// Variance of its error, relative to that of the noise.
-    variance: f64,
+    /// Gaps under an autoregressive law.
+    gaps: Arc<Gaps>,
 }
 
 /// Runs of equally spaced samples without a gap; `None` if the samples are not equally spaced apart from gaps.
@@ -79,27 +67,31 @@ impl Correlation {
     /// Correlation under `law` of samples at `times`.
     ///
     /// After a gap of equally spaced samples each of the first `p` is predicted from the last `2 p + 1` samples before the gap and
-    /// those since, which is exact for `p = 1` and neglects what earlier samples add otherwise (Vecchia 1988). An autoregressive law of
-    /// samples that are not equally spaced gives `None`.
+    /// those since, which is exact where `p` of them are in a row and neglects what earlier samples add otherwise (Vecchia 1988). An
+    /// autoregressive law of samples that are not equally spaced gives `None`.
     pub fn new(law: CorrelationLaw, times: &[f64]) -> Option<Self> {
-        let (runs, predictors) = match &law {
+        let (runs, gaps, predictors) = match &law {
             CorrelationLaw::Autoregressive(process) => {
                 let runs = uninterrupted_runs(times)?;
-                let predictors = predictors_after_gaps(process, &runs, times);
-                (runs, predictors)
+                let gaps = Gaps::of(process.order(), &runs, times);
+                let predictors = gaps.predictors(process, &runs);
+                (runs, gaps, predictors)
             }
             CorrelationLaw::Exponential { time } => {
                 return Some(Self::exponential(*time, times.into()));
             }
-            CorrelationLaw::InputErrors(_) => {
-                (std::iter::once(0..times.len()).collect(), Vec::new())
-            }
+            CorrelationLaw::InputErrors(_) => (
+                std::iter::once(0..times.len()).collect(),
+                Gaps::default(),
+                Vec::new(),
+            ),
         };
         Some(Self {
             law,
             times: times.into(),
             runs,
             predictors,
+            gaps: Arc::new(gaps),
         })
     }
 
@@ -108,7 +100,7 @@ impl Correlation {
             let link = (-(pair[1] - pair[0]) / time).exp();
             Predictor {
                 sample: i + 1,
-                coefficients: vec![link],
+                coefficients: Arc::new([link]),
                 variance: (1.0 - link) * (1.0 + link),
             }
         });
@@ -116,6 +108,7 @@ impl Correlation {
             law: CorrelationLaw::Exponential { time },
             runs: std::iter::once(0..times.len()).collect(),
             predictors: later.collect(),
+            gaps: Arc::default(),
             times,
         }
     }
@@ -159,10 +152,11 @@ impl Correlation {
             CorrelationLaw::Autoregressive(_) => {
                 let process = Autoregression::from_coordinates(coordinates);
                 Self {
-                    predictors: predictors_after_gaps(&process, &self.runs, &self.times),
+                    predictors: self.gaps.predictors(&process, &self.runs),
                     law: CorrelationLaw::Autoregressive(process),
                     times: Arc::clone(&self.times),
                     runs: self.runs.clone(),
+                    gaps: Arc::clone(&self.gaps),
                 }
             }
             CorrelationLaw::Exponential { .. } => {
@@ -194,6 +188,7 @@ impl Correlation {
             times: self.times[..count.min(self.times.len())].into(),
             runs: runs.map(|run| run.start..run.end.min(count)).collect(),
             predictors: predictors.cloned().collect(),
+            gaps: Arc::clone(&self.gaps),
         }
     }
 
@@ -295,64 +290,6 @@ impl Correlation {
             }
         }
     }
-}
-
-/// Predictors of the first `p` samples after each gap from the last `2 p + 1` before it and those since: one factorisation a gap.
-fn predictors_after_gaps(
-    process: &Autoregression,
-    runs: &[Range<usize>],
-    times: &[f64],
-) -> Vec<Predictor> {
-    if runs.len() < 2 {
-        return Vec::new();
-    }
-    let order = process.order();
-    let spacing = runs.iter().find(|run| run.len() > 1);
-    let Some(spacing) = spacing.map(|run| times[run.start + 1] - times[run.start]) else {
-        return Vec::new();
-    };
-    let lags = process.autocorrelation(LONGEST_GAP);
-    let mut predictors = Vec::new();
-    // Many gaps are alike: single samples left out.
-    let mut known: BTreeMap<Vec<usize>, Vec<(Vec<f64>, f64)>> = BTreeMap::new();
-    for pair in runs.windows(2) {
-        let run = &pair[1];
-        let last = run.end.min(run.start + order) - 1;
-        let place = |i: usize| ((times[last] - times[i]) / spacing).round() as usize;
-        let near = (run.start.saturating_sub(2 * order + 1)..=last).map(place);
-        let near: Vec<usize> = near.skip_while(|place| *place >= lags.len()).collect();
-        let after = last + 1 - run.start;
-        let found = known.entry(near);
-        let found = found.or_insert_with_key(|near| last_predictors(near, after, &lags));
-        let samples = (run.start..).zip(found.clone());
-        predictors.extend(samples.map(|(sample, (coefficients, variance))| Predictor {
-            sample,
-            coefficients,
-            variance,
-        }));
-    }
-    predictors
-}
-
-/// Best linear predictors of each of the last `count` samples at `places`, in spacings before the last one, from all before it:
-/// coefficients, the nearest sample first, and the variance of the error. Row `m` of the Cholesky factor `L` of the correlations
-/// holds both: `L_m^T c = l_m` with its part `l_m` left of the diagonal, variance `L_mm^2`.
-fn last_predictors(places: &[usize], count: usize, lags: &[f64]) -> Vec<(Vec<f64>, f64)> {
-    let n = places.len();
-    let matrix = DMatrix::from_fn(n, n, |i, j| lags[places[i].abs_diff(places[j])]);
-    let Some(factor) = matrix.cholesky() else {
-        return Vec::new();
-    };
-    let lower = factor.l_dirty();
-    let predictor = |m: usize| {
-        let mut coefficients = lower.view((m, 0), (1, m)).transpose();
-        let earlier = lower.view((0, 0), (m, m));
-        let solved = earlier.tr_solve_lower_triangular_mut(&mut coefficients);
-        debug_assert!(solved, "a Cholesky factor has a positive diagonal");
-        let coefficients = coefficients.iter().rev().copied().collect();
-        (coefficients, lower[(m, m)].powi(2))
-    };
-    (n - count..n).map(predictor).collect()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ mod autoregression;
 mod burg;
 mod correlation;
 mod exponential;
+mod gaps;
 mod input_errors;
 mod kernel_covariance;
 mod order;

@@ -16,6 +16,7 @@ use crate::objective::{Evaluation, GradientKind};
 use crate::problem::Problem;
 use crate::record::Channel;
 use crate::step::SimulationError;
+use crate::threads::is_stopped;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
 
@@ -202,8 +203,9 @@ impl SearchDriver<'_, '_> {
             }
         }
         if self.outcome.is_none() {
-            self.outcome = self.ended_from_outside();
+            self.outcome = self.out_of_time();
         }
+        self.obey();
     }
 
     /// Outcome of a search that ends before its first iteration.
@@ -228,11 +230,18 @@ impl SearchDriver<'_, '_> {
         self.settings.stopping.out_of_iterations(0)
     }
 
-    fn ended_from_outside(&self) -> Option<Outcome> {
+    /// Ends a search that is to be interrupted, which others may follow: one that converges in the same iteration as well. Fits within an
+    /// assessment have no flag of their own.
+    fn obey(&mut self) {
         let flag = self.settings.interrupt.as_ref();
-        if flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            return Some(Outcome::new(Status::Interrupted, Reason::Interrupted));
+        let is_asked = is_stopped() || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+        let has_failed = |o: &Outcome| matches!(o.status, Status::Failed | Status::Infeasible);
+        if is_asked && !self.outcome.as_ref().is_some_and(has_failed) {
+            self.outcome = Some(Outcome::new(Status::Interrupted, Reason::Interrupted));
         }
+    }
+
+    fn out_of_time(&self) -> Option<Outcome> {
         let limit = self.settings.stopping.limit?;
         let is_over = self.clock.elapsed() >= limit;
         is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
@@ -287,6 +296,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_>
         }
         self.timings += work.timings;
         self.outcome = self.nothing_to_do(problem.problem);
+        self.obey();
         Ok((self.view(state), None))
     }
 

@@ -79,7 +79,7 @@ fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
         else {
             continue;
         };
-        let effect = input_error_effect(measured, evaluation, e, channel, &error);
+        let effect = input_error_effect(measured, evaluation, e, channel, &error, channel.len());
         let predicted = &evaluation.predictions[e][0];
         let channel = &mut measured.parts_mut().experiments[e].channels[0];
         *channel = with_sigma(channel, &effect, error.sigma, predicted, share);
@@ -138,20 +138,17 @@ fn sigma_of(channel: &Channel) -> f64 {
     channel.weighting().sigma(0).unwrap_or(1.0)
 }
 
-/// Effect of errors of the input of experiment `e` on the samples of a channel, in the unit of the samples.
+/// Effect of errors of the input of experiment `e` on the first `count` samples of a channel, in the unit of the samples.
 pub(crate) fn input_error_effect(
     problem: &Problem,
     evaluation: &Evaluation,
     e: usize,
     channel: &Channel,
     error: &InputError,
+    count: usize,
 ) -> InputErrors {
     let view = problem.view(evaluation, e);
     let derivatives = (view.driven()).input_derivatives(view.response, error.quantity);
-    let steps: Vec<InputStep> = derivatives
-        .into_iter()
-        .map(|(state, input)| InputStep { state, input })
-        .collect();
     let [gain, ..] = channel.sensor().values(view.scalars);
     let grid = &problem.system.grid;
     let is_acceleration = channel.kind() == ChannelKind::Acceleration;
@@ -159,7 +156,7 @@ pub(crate) fn input_error_effect(
     let acting = view
         .excitation
         .map_or(vec![0], |e| e.acting(error.quantity));
-    let rows: Vec<InputRow> = (0..channel.len())
+    let rows: Vec<InputRow> = (0..count)
         .map(|j| {
             let place = channel.place(view, j);
             let by_input = match is_acceleration {
@@ -176,6 +173,10 @@ pub(crate) fn input_error_effect(
             }
         })
         .collect();
+    let reached = rows.last().map_or(0, |row| row.step) + 1;
+    let steps = derivatives.into_iter().take(reached);
+    let steps = steps.map(|(state, input)| InputStep { state, input });
+    let steps: Vec<InputStep> = steps.collect();
     let places = error.places(grid, steps.len() + 1);
     InputErrors::new(&steps, &places, &rows)
 }

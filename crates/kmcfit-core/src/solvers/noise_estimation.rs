@@ -189,10 +189,13 @@ fn with_correlations(
 ) -> Result<Fit, SimulationError> {
     let mut white = None;
     for pass in 0..PASSES {
+        if is_ended(&found) {
+            break;
+        }
         let next = counted(&mut found, |found| {
             correlated(problem, found, pass >= FREE_PASSES)
         });
-        let Some(next) = next.filter(|_| !is_ended(&found)) else {
+        let Some(next) = next else {
             break;
         };
         white.get_or_insert_with(|| (problem.clone(), found.clone()));

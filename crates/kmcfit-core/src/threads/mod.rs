@@ -7,7 +7,7 @@
 
 mod parallel;
 
-pub use parallel::{interruptible, map, map_with_progress};
+pub use parallel::{interruptible, is_stopped, map, map_with_progress};
 
 use std::cell::Cell;
 use std::io;

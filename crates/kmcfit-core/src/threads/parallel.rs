@@ -44,11 +44,16 @@ pub fn map_with_progress<T: Send>(
         result
     };
     let flag = INTERRUPT.with_borrow(Clone::clone);
-    let is_set = || {
-        flag.as_ref()
-            .is_some_and(|flag| flag.load(Ordering::Relaxed))
-    };
-    map_until(count, threads, job, || host::is_interrupted() || is_set())
+    map_until(count, threads, job, || is_asked(flag.as_ref()))
+}
+
+/// True once the host asks to end, or the flag of the [`interruptible`] work of this thread is set.
+pub fn is_stopped() -> bool {
+    INTERRUPT.with_borrow(|flag| is_asked(flag.as_ref()))
+}
+
+fn is_asked(flag: Option<&Arc<AtomicBool>>) -> bool {
+    host::is_interrupted() || flag.is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
 /// Computes `work(0), work(1), ...` on up to `threads` threads and returns the results in order. Each job depends on its

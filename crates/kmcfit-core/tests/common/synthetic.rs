@@ -70,7 +70,10 @@ impl Truth<'_> {
     }
 }
 
-#[allow(clippy::match_wildcard_for_single_variants, reason = "of a law that is added, too")]
+#[allow(
+    clippy::match_wildcard_for_single_variants,
+    reason = "of a law that is added, too"
+)]
 fn response(term: Law) -> Response {
     match term {
         Law::Damping => Response::Damping,

@@ -2,7 +2,7 @@
 //! named as the cause of a poor fit without the parameter. Oscillators of 1 Hz under a broadband force, by an independent integrator.
 
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{FitAssessment, FitWarning, RecordError};
+use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
 use kmcfit_core::internals::builder::{
     Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec, SensorSpec,
 };
@@ -200,7 +200,7 @@ fn delays_are_named_without_the_parameter() {
             .plausibility
             .warnings;
         let named = warnings.iter().find_map(|w| match w {
-            FitWarning::RecordError(RecordError::Delay { samples, .. }) => Some(*samples),
+            Doubt::RecordError(RecordError::Delay { samples, .. }) => Some(*samples),
             _ => None,
         });
         let found = named.unwrap_or_else(|| panic!("{delay}: {warnings:?}"));

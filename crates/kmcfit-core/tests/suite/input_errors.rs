@@ -5,7 +5,7 @@
 
 use crate::common::counts::{least_held, seeds, widened};
 use crate::common::forced::{self, broadband, rms};
-use kmcfit_core::internals::assessment::{FitWarning, Plausibility};
+use kmcfit_core::internals::assessment::{Doubt, Plausibility};
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, InputErrorKind, Weighting};
@@ -181,8 +181,7 @@ fn errors_of_the_force_pass_into_accelerations_between_nodes() {
     for seed in 0..seeds {
         let (problem, fit) = fitted(case, seed);
         let warnings = Plausibility::at(&problem, &fit.best.evaluation).warnings;
-        let is_contradiction =
-            |w: &FitWarning| matches!(w, FitWarning::ContradictedInputSigma { .. });
+        let is_contradiction = |w: &Doubt| matches!(w, Doubt::ContradictedInputSigma { .. });
         assert!(
             !warnings.iter().any(is_contradiction),
             "{seed}: {warnings:?}"
@@ -258,7 +257,7 @@ fn intervals_that_ignore_errors_of_the_force_are_too_short() {
 }
 
 /// The warnings of a fit.
-fn warnings(case: Case, seed: u64) -> Vec<FitWarning> {
+fn warnings(case: Case, seed: u64) -> Vec<Doubt> {
     let (problem, fit) = fitted(case, seed);
     Plausibility::at(&problem, &fit.best.evaluation).warnings
 }
@@ -266,7 +265,7 @@ fn warnings(case: Case, seed: u64) -> Vec<FitWarning> {
 fn is_disturbed(case: Case, seed: u64) -> bool {
     let warnings = warnings(case, seed);
     let mut each = warnings.iter();
-    each.any(|w| matches!(w, FitWarning::DisturbedInput { .. }))
+    each.any(|w| matches!(w, Doubt::DisturbedInput { .. }))
 }
 
 /// Without a stated sigma of the force: its errors are found in nine of ten records at least, and in one record with white or autoregressive
@@ -317,7 +316,7 @@ fn a_wrong_sigma_of_the_force_is_contradicted() {
         for factor in [0.5, 2.0] {
             let warnings = warnings(Case { factor, ..case }, seed);
             let contradiction = warnings.iter().find_map(|w| match w {
-                FitWarning::ContradictedInputSigma { given, likely, .. } => Some((*given, *likely)),
+                Doubt::ContradictedInputSigma { given, likely, .. } => Some((*given, *likely)),
                 _ => None,
             });
             let (given, likely) =

@@ -2,7 +2,7 @@
 //! are. Oscillators of 1 Hz under a broadband force, 400 displacements with 2 % noise, by an independent integrator.
 
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{FitAssessment, FitWarning, RecordError};
+use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
@@ -45,7 +45,7 @@ fn named(seed: u64, at: &[usize], error: f64) -> Option<RecordError> {
         .plausibility
         .warnings;
     warnings.into_iter().find_map(|warning| match warning {
-        FitWarning::RecordError(error) => Some(error),
+        Doubt::RecordError(error) => Some(error),
         _ => None,
     })
 }

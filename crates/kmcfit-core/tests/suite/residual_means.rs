@@ -3,7 +3,7 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{FitAssessment, FitWarning};
+use kmcfit_core::internals::assessment::{Doubt, FitAssessment};
 use kmcfit_core::internals::builder::{
     Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec, SensorSpec,
 };
@@ -68,7 +68,7 @@ impl Case {
     }
 
     /// The fit, and the warnings about means.
-    fn fitted(&self, estimates_offset: bool) -> (Problem, Fit, Vec<FitWarning>) {
+    fn fitted(&self, estimates_offset: bool) -> (Problem, Fit, Vec<Doubt>) {
         let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
         let mut channel = ChannelSpec::new(self.kind, &times, &self.samples);
         channel.weighting = Some(Weighting::Estimated { sigma: self.sigma });
@@ -90,7 +90,7 @@ impl Case {
         let (problem, fit) = fit_with_noise(&problem, &start, &settings, &mut |_| {}).unwrap();
         let assessment = FitAssessment::of(&problem, &fit, false);
         let mut warnings = assessment.plausibility.warnings;
-        warnings.retain(|w| matches!(w, FitWarning::ResidualMean { .. }));
+        warnings.retain(|w| matches!(w, Doubt::ResidualMean { .. }));
         (problem, fit, warnings)
     }
 }
@@ -113,7 +113,7 @@ fn an_offset_is_named_and_its_estimate_removes_the_mean() {
         let case = Case::new(seed, true);
         let (before, fit, warnings) = case.fitted(false);
         let [
-            FitWarning::ResidualMean {
+            Doubt::ResidualMean {
                 mean,
                 or_static_force,
                 ..

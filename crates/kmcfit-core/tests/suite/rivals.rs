@@ -3,7 +3,7 @@
 
 use crate::common::forced::{response, white};
 use kmcfit_core::internals::assessment::{
-    FitAssessment, VerdictReason, function_summaries, verdict_reasons,
+    Doubt, FitAssessment, function_summaries, verdict_reasons,
 };
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::identifiability::ClassificationKind;
@@ -84,7 +84,7 @@ fn said(kind: Kind, seed: u64) -> Said {
         fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let assessment = FitAssessment::of(&problem, &fit, true);
     let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
-    let is_rival = |r: &VerdictReason| matches!(r, VerdictReason::TimeOrAmplitude(_));
+    let is_rival = |r: &Doubt| matches!(r, Doubt::TimeOrAmplitude(_));
     if reasons.iter().any(is_rival) {
         return Said::TimeOrAmplitude;
     }

@@ -8,8 +8,7 @@
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, FitAssessment, RecordError, VerdictLevel, VerdictReason, estimates,
-    verdict_level, verdict_reasons,
+    ClassicalEstimate, Doubt, FitAssessment, RecordError, VerdictLevel, estimates, verdict_reasons,
 };
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec};
 use kmcfit_core::internals::functions::CoefficientKind;
@@ -359,7 +358,13 @@ impl Case {
         let shift = shifts.reduce(f64::max).unwrap_or(f64::INFINITY);
         Found {
             classical: assessment.classical.clone(),
-            level: verdict_level(&reasons),
+            level: VerdictLevel::of(
+                reasons
+                    .iter()
+                    .map(Doubt::severity)
+                    .max()
+                    .unwrap_or_default(),
+            ),
             reasons,
             shift,
             residual: residual(&problem, &fit.best.evaluation) / self.innovations(sigma),
@@ -378,7 +383,7 @@ fn residual(problem: &Problem, evaluation: &Evaluation) -> f64 {
 struct Found {
     classical: Option<ClassicalEstimate>,
     level: VerdictLevel,
-    reasons: Vec<VerdictReason>,
+    reasons: Vec<Doubt>,
     /// Largest error of mass, damping and stiffness in standard errors, infinite without them.
     shift: f64,
     /// Root mean square of the residuals over sigma of the noise, or over that of its innovations.
@@ -399,7 +404,7 @@ fn cases() -> u64 {
     given.map_or(5, |text| text.parse().expect("a number of cases"))
 }
 
-fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
+fn count(kind: Kind, is_right: impl Fn(&Doubt) -> bool) -> Counts {
     let shows = std::env::var_os("KMCFIT_SHOW").is_some();
     let found: Vec<Found> = (0..cases())
         .map(|seed| {
@@ -447,7 +452,7 @@ fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
 }
 
 /// Never adequate, with the right reason in at least 80 %, and of the stated size. With 200 seeds two kinds miss the first.
-fn assert_found(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) {
+fn assert_found(kind: Kind, is_right: impl Fn(&Doubt) -> bool) {
     let counts = count(kind, is_right);
     assert_eq!(counts.levels[0], 0, "{kind:?} is adequate");
     assert!(
@@ -525,7 +530,7 @@ fn corrected_records_predict_another_record() {
             };
             let found = case.verdict();
             let mut errors = found.reasons.iter().filter_map(|reason| match reason {
-                VerdictReason::RecordError(error) => Some(error),
+                Doubt::RecordError(error) => Some(error),
                 _ => None,
             });
             let Some(error) = errors.next_back() else {
@@ -546,7 +551,7 @@ fn quadratic_damping_as_viscous() {
     let of = CoefficientKind::QUADRATIC_DAMPING;
     assert_found(
         Kind::QuadraticDamping,
-        |reason| matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of),
+        |reason| matches!(reason, Doubt::MissingTerm(missing) if missing.term == of),
     );
 }
 
@@ -555,14 +560,14 @@ fn friction_left_out() {
     let of = CoefficientKind::COULOMB_FRICTION;
     assert_found(
         Kind::Friction,
-        |reason| matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of),
+        |reason| matches!(reason, Doubt::MissingTerm(missing) if missing.term == of),
     );
 }
 
 #[test]
 fn a_second_mode() {
     assert_found(Kind::SecondMode, |reason| {
-        matches!(reason, VerdictReason::SecondMode { .. })
+        matches!(reason, Doubt::SecondMode { .. })
     });
 }
 
@@ -573,7 +578,7 @@ fn a_weak_second_mode() {
     assert_found(Kind::WeakMode, |reason| {
         matches!(
             reason,
-            VerdictReason::CoherentResiduals { .. } | VerdictReason::SecondMode { .. }
+            Doubt::CoherentResiduals { .. } | Doubt::SecondMode { .. }
         )
     });
 }
@@ -581,14 +586,14 @@ fn a_weak_second_mode() {
 #[test]
 fn saturation() {
     assert_found(Kind::Saturation, |reason| {
-        matches!(reason, VerdictReason::Saturation { .. })
+        matches!(reason, Doubt::Saturation { .. })
     });
 }
 
 #[test]
 fn clocks_that_differ() {
     assert_found(Kind::Clocks, |reason| match reason {
-        VerdictReason::RecordError(RecordError::ClockDifference { percent, .. }) => {
+        Doubt::RecordError(RecordError::ClockDifference { percent, .. }) => {
             (percent.abs() - 100.0 * CLOCKS).abs() < 0.1
         }
         _ => false,
@@ -598,9 +603,7 @@ fn clocks_that_differ() {
 #[test]
 fn a_delay() {
     assert_found(Kind::Delay, |reason| match reason {
-        VerdictReason::RecordError(RecordError::Delay { samples, .. }) => {
-            (samples - DELAY).abs() < 0.1
-        }
+        Doubt::RecordError(RecordError::Delay { samples, .. }) => (samples - DELAY).abs() < 0.1,
         _ => false,
     });
 }
@@ -608,17 +611,14 @@ fn a_delay() {
 #[test]
 fn the_sign_of_the_force() {
     assert_found(Kind::ForceSign, |reason| {
-        matches!(
-            reason,
-            VerdictReason::RecordError(RecordError::InputSign { .. })
-        )
+        matches!(reason, Doubt::RecordError(RecordError::InputSign { .. }))
     });
 }
 
 /// True for a factor of the acceleration, or the inverse of one of the displacement, within a tenth.
-fn is_factor(reason: &VerdictReason, expected: f64) -> bool {
+fn is_factor(reason: &Doubt, expected: f64) -> bool {
     match reason {
-        VerdictReason::RecordError(RecordError::ChannelFactor {
+        Doubt::RecordError(RecordError::ChannelFactor {
             channel, factor, ..
         }) => {
             let factor = match channel.as_str() {
@@ -639,6 +639,6 @@ fn one_of_two_channels_off_by_1000() {
 #[test]
 fn coloured_noise_as_white() {
     assert_found(Kind::Coloured, |reason| {
-        matches!(reason, VerdictReason::ColouredResiduals)
+        matches!(reason, Doubt::Coloured { .. })
     });
 }

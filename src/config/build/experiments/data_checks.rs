@@ -11,6 +11,7 @@ use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
+use kmcfit_core::internals::assessment::Severity;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::record::{ChannelKind, Loss};
@@ -147,7 +148,7 @@ fn unit_factors(
             let text =
                 format!("{quantity} is {times} times its expected value, {factor}; check `units`");
             let of = json!({"quantity": quantity, "ratio": ratio, "factor": factor});
-            found.push(Finding::having("suspicious_factor", text, of));
+            found.push(Finding::having("suspicious_factor", text, of).rated(Severity::Check));
         }
     };
     let first = |kind: ChannelKind| record.channels.iter().find(|c| c.kind == kind);
@@ -221,7 +222,7 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
         let read = read.unwrap_or_default();
         let text = format!("{magnitudes} is implausible{read}; check `units`");
         let found = json!({"magnitudes": magnitudes, "reading": reading});
-        return vec![Finding::having("implausible_magnitudes", text, found)];
+        return vec![Finding::having("implausible_magnitudes", text, found).rated(Severity::Check)];
     }
     let hum = first
         .time_unit
@@ -233,7 +234,7 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
             significant(frequency, 3)
         );
         let found = json!({"channel": channel, "frequency": frequency, "unit": unit});
-        Finding::having("mains_hum", text, found)
+        Finding::having("mains_hum", text, found).rated(Severity::Check)
     });
     hum.into_iter().collect()
 }
@@ -257,7 +258,7 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
         significant(ratio, 3)
     );
     let found = json!({"channel": channel, "implied": implied, "ratio": ratio, "factor": factor});
-    Some(Finding::having("suspicious_mass", text, found))
+    Some(Finding::having("suspicious_mass", text, found).rated(Severity::Check))
 }
 
 /// Pairs of channels of one response with opposite signs.
@@ -371,7 +372,8 @@ fn missing_codes(record: &RawRecord) -> Option<Finding> {
         json!(codes)
     );
     let found = json!({"channels": channels, "codes": codes});
-    (!codes.is_empty()).then(|| Finding::having("missing_codes", text, found))
+    (!codes.is_empty())
+        .then(|| Finding::having("missing_codes", text, found).rated(Severity::Check))
 }
 
 /// A free record, or one with a measured force, in which two modes vibrate.
@@ -394,7 +396,7 @@ fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
         significant(second, 3)
     );
     let found = json!({"channel": channel, "frequencies": frequencies});
-    Some(Finding::having("two_modes", text, found))
+    Some(Finding::having("two_modes", text, found).rated(Severity::Check))
 }
 
 fn has_input(spec: &ExperimentSpec, record: &RawRecord) -> bool {
@@ -456,5 +458,5 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<Finding> {
         "first_time": time,
         "unit": unit
     });
-    Some(Finding::having("outliers", text, found))
+    Some(Finding::having("outliers", text, found).rated(Severity::Check))
 }

@@ -10,6 +10,7 @@ use crate::config::spec::FaultName;
 use crate::finding::Finding;
 use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
+use kmcfit_core::internals::assessment::Severity;
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::internals::system::round_time;
@@ -148,7 +149,7 @@ impl Column<'_> {
                 time(to)
             );
             let found = json!({"channel": channel, "count": all.len(), "longest": [from, to]});
-            let warning = Finding::having("input_gaps", text, found);
+            let warning = Finding::having("input_gaps", text, found).rated(Severity::Check);
             notes.warnings.push(self.entry.placed(warning));
         }
     }
@@ -258,7 +259,9 @@ impl Column<'_> {
             }
         };
         let fact = fact(kind, &text, action, found).with("count", count);
-        let warning = Finding::having(kind, warning, of_warning).with("samples", count);
+        let warning = Finding::having(kind, warning, of_warning)
+            .rated(Severity::Check)
+            .with("samples", count);
         [fact, warning].map(|finding| finding.with("channel", channel))
     }
 }

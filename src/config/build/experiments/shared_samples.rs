@@ -5,6 +5,7 @@ use crate::config::ModelFile;
 use crate::config::spec::ColumnRef;
 use crate::error::InputError;
 use crate::finding::Finding;
+use kmcfit_core::internals::assessment::Severity;
 
 /// Refuses an experiment with the same column in two places.
 ///
@@ -85,7 +86,7 @@ pub fn repeated_records(file: &ModelFile, records: &[Option<RawRecord>]) -> Vec<
                 "{name} has the samples of {other}: listed twice, they narrow the intervals without further information; remove one"
             );
             let warning = Finding::new("repeated_record", text).with("experiment", &name);
-            let warning = warning.with("other", other);
+            let warning = warning.with("other", other).rated(Severity::Check);
             warnings.push(warning.at(&format!("experiments[{later}] ({name})")));
         }
     }

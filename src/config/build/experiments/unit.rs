@@ -6,6 +6,7 @@ use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
 use crate::units::{Quantity, ScaledUnit, Unit};
+use kmcfit_core::internals::assessment::Severity;
 use serde_json::json;
 
 /// Kind of the statement of a unit that neither the model nor the file states; it stands beside a result, and is no warning.
@@ -45,8 +46,11 @@ impl QuantityColumn<'_> {
             );
             let found =
                 json!({"column": column, "stated": stated, "quantity": quantity, "unit": unit});
-            warnings
-                .push(Finding::having("scale_not_applied", text, found).at(&self.key("columns")));
+            warnings.push(
+                Finding::having("scale_not_applied", text, found)
+                    .rated(Severity::Check)
+                    .at(&self.key("columns")),
+            );
         }
         self.stated_unit(warnings).map(ScaledUnit::from)
     }
@@ -111,7 +115,11 @@ impl QuantityColumn<'_> {
                 name.replace('_', " ")
             );
             let found = json!({"column": column, "quantity": name, "unit": unit});
-            warnings.push(Finding::having("volts", text, found).at(&columns_key));
+            warnings.push(
+                Finding::having("volts", text, found)
+                    .rated(Severity::Check)
+                    .at(&columns_key),
+            );
             return Ok(volts);
         }
         if let Some(unit) = stated.explicit(kind) {
@@ -149,7 +157,15 @@ impl QuantityColumn<'_> {
                 json!({"column": column, "quantity": name, "unit": used}),
             ),
         };
-        warnings.push(Finding::having(warning, text, found).at(&columns_key));
+        let severity = match warning {
+            UNIT_ASSUMED => Severity::Note,
+            _ => Severity::Check,
+        };
+        warnings.push(
+            Finding::having(warning, text, found)
+                .rated(severity)
+                .at(&columns_key),
+        );
         Ok(si)
     }
 

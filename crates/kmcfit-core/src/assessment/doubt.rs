@@ -1,18 +1,20 @@
-//! Warnings about a fit.
+//! Doubts about a fit: reasons of its verdict, and what limits its intervals.
 
 use super::classical::ClassicalEstimate;
+use super::implausible::Implausible;
 use super::record_error::RecordError;
 use super::refinement::CoarseBasis;
 use super::rivals::AmplitudeRival;
 use crate::record::ScoreCovariance;
-use crate::solvers::MissingTerm;
+use crate::solvers::{MissingTerm, Status};
+use crate::step::SimulationError;
 use crate::system::InputQuantity;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-/// A warning about a fit.
+/// A doubt about a fit: one test that it did not pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum FitWarning {
+pub enum Doubt {
     /// The residuals are a multiple of sigma: standard errors are unknown.
     BeyondSigma {
         /// Residuals of the worst channel over its sigma.
@@ -24,7 +26,10 @@ pub enum FitWarning {
         times: f64,
     },
     /// The residuals are large and not white: standard errors are unknown.
-    PoorFit,
+    PoorFit {
+        /// Fit of the worst channel, per cent.
+        fit_percent: f64,
+    },
     /// The residuals are not white, beyond the noise model.
     Coloured {
         /// Covariance of the intervals: that of the model gives standard errors that are too small.
@@ -153,7 +158,136 @@ pub enum FitWarning {
     },
     /// A classical estimate and that of the fit differ by more than their intervals.
     ClassicalDisagrees(ClassicalEstimate),
+    /// The fit failed or no parameters satisfy the constraints.
+    Failed {
+        /// Status at the end.
+        status: Status,
+    },
+    /// The optimum identifies no system.
+    NoSystem {
+        /// The reason.
+        #[serde(skip)]
+        reason: Unidentified,
+    },
+    /// The fit ended before it converged.
+    NotConverged {
+        /// Status at the end.
+        status: Status,
+    },
+    /// Many samples equal the largest one.
+    Saturation {
+        /// Name of the channel.
+        channel: String,
+    },
+    /// The quantisation error of an input is not small beside the residuals, and the intervals do not contain it.
+    CoarseInput {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the channel.
+        channel: String,
+    },
+    /// An estimated delay beyond its limits.
+    DelayAtLimit {
+        /// Name of the parameter.
+        parameter: String,
+    },
+    /// A validation record is not predicted.
+    NotPredicted {
+        /// Name of the record.
+        experiment: String,
+        /// Fit of its worst channel, per cent.
+        fit_percent: f64,
+    },
+    /// Functions that the samples do not identify, or only at some times.
+    NotIdentified {
+        /// Names of the functions.
+        functions: Vec<String>,
+    },
+    /// Fewer parameter combinations are identifiable than parameters are estimated.
+    RankDeficient {
+        /// Largest number of identifiable combinations.
+        rank_bound: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// Without a measured force the samples determine ratios to the mass only, and no function is fixed.
+    OnlyRatios,
+    /// No input is measured, and an unknown force acts: the equation error does not determine the damping.
+    UnmeasuredForce,
+    /// The equation error neglects the noise of the response, which biases its estimates.
+    EquationError,
+    /// The residual of the equation of motion is a large share of its largest force.
+    EquationResidual {
+        /// Root mean square of the residual relative to that of the largest force.
+        share: f64,
+    },
+    /// The natural frequency or the response is outside the range of mechanical systems.
+    ImplausibleUnits(Implausible),
+    /// A request to end left out a part of the assessment.
+    Stopped {
+        /// The parts.
+        not_done: Vec<&'static str>,
+    },
     /// An error of a record explains the residuals.
     #[serde(untagged)]
     RecordError(RecordError),
+}
+
+/// Reason for which an optimum identifies no system.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Unidentified {
+    /// The fit failed.
+    Failed,
+    /// The simulation with half the step fails.
+    NoResponseOnHalfStep {
+        /// Error of the simulation.
+        #[serde(skip)]
+        error: SimulationError,
+    },
+    /// Halving the step changes the response by more than a tenth of the largest sample.
+    StepDependent,
+    /// The residuals of all channels exceed twice the variation of their samples.
+    Unrelated,
+    /// Noise of the size of the samples would be matched equally well.
+    Noise,
+}
+
+/// What a finding means for the use of the estimates.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// What is determined, or how.
+    #[default]
+    Note,
+    /// What is to be known, and limits no estimate beyond its interval.
+    Warning,
+    /// It limits the estimates, or an engineer must decide whether it does: a reason of the verdict.
+    Check,
+    /// The estimates are not those of the system: a reason of the verdict.
+    Inadequate,
+}
+
+impl Doubt {
+    /// What it means for the estimates.
+    pub fn severity(&self) -> Severity {
+        match self {
+            Self::Failed { .. }
+            | Self::NoSystem { .. }
+            | Self::PoorFit { .. }
+            | Self::BeyondSigma { .. }
+            | Self::CoarseSteps { .. }
+            | Self::RecordError(RecordError::InputSign { .. }) => Severity::Inadequate,
+            Self::Correlated => Severity::Warning,
+            _ => Severity::Check,
+        }
+    }
+
+    /// True for what names the cause of other doubts.
+    pub fn is_cause(&self) -> bool {
+        matches!(
+            self,
+            Self::MissingTerm(_) | Self::SecondMode { .. } | Self::RecordError(_)
+        )
+    }
 }
