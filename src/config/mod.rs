@@ -5,13 +5,13 @@
 //! each other and reports errors at the line of a key by [`ModelFile::error_at`].
 
 pub mod alternatives;
-mod build;
 mod choice;
 mod dominant;
 mod input_limits;
 pub mod key;
 pub mod key_documentation;
 pub mod key_positions;
+mod lowering;
 mod map;
 mod model_file;
 mod new_record;
@@ -26,7 +26,7 @@ mod syntax;
 pub mod values;
 mod yaml_errors;
 
-pub use build::{
+pub use lowering::{
     AutomaticGrid, BuildMode, ChannelNote, HoldOut, Model, Preparation, StudyPlan, StudyTarget,
     WeightSearch, build,
 };

@@ -2,7 +2,7 @@
 
 use super::ModelFile;
 use super::alternatives::ScalarOr;
-use super::build::sensor_of;
+use super::lowering::sensor_of;
 use super::scaffold::Role;
 use super::spec::{ColumnRef, DelayValue, EstimateValue, ExperimentSpec, SensorSpec};
 use super::values::{ColumnId, NumberOrEstimate, Text};

@@ -1,7 +1,7 @@
 //! Keys of a model file: structs that mirror the YAML, with the documentation of every key.
 //!
 //! A new key is a new field; an optional one is an `Option`. Conditions that concern several keys are checked in
-//! `config/build/`, where the problem is built.
+//! `config/lowering/`, where the problem is built.
 
 mod by_coefficient;
 mod experiment;

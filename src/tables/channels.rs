@@ -17,7 +17,7 @@ use crate::units::Quantity;
 /// Names of the column of times that is made from a sampling rate or interval; the second where a channel has the first.
 const TIME: [&str; 2] = ["time", "sampling time"];
 /// Numbers stored for each sample beside the columns, as for text.
-const BESIDE: usize = 14;
+const NUMBERS_PER_SAMPLE: usize = 14;
 
 impl Table {
     /// Tables of a binary file.
@@ -79,7 +79,7 @@ impl Table {
         members: Vec<(usize, Channel)>,
     ) -> Result<Self, InputError> {
         let (rows, sampling) = file.sets.get(set).copied().unwrap_or_default();
-        let numbers = rows.saturating_mul(members.len() + BESIDE);
+        let numbers = rows.saturating_mul(members.len() + NUMBERS_PER_SAMPLE);
         memory::check_file(path, numbers.saturating_mul(size_of::<f64>()) as u64)?;
         let origin = Origin::Channels(ChannelOrigin {
             file: Arc::clone(file),

@@ -8,7 +8,7 @@ use std::path::Path;
 /// Numbers stored for each row beside its fields: its line, the times and samples of the record made from the table, and those of the
 /// tests for faulty samples and of the spectrum. Measured: 222 bytes per row, text included, for `check` of a record of two million rows
 /// with two columns; one third is added for losses of the allocator.
-const BESIDE: usize = 35;
+const NUMBERS_PER_ROW: usize = 35;
 
 /// Bounds on the number of rows of a text.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +38,7 @@ impl<'a> TableMemory<'a> {
     /// # Errors
     /// With the needed and the available memory.
     pub fn check(&self, width: usize) -> Result<(), InputError> {
-        let numbers = self.rows(width).saturating_mul(width + BESIDE);
+        let numbers = self.rows(width).saturating_mul(width + NUMBERS_PER_ROW);
         let bytes = numbers.saturating_mul(size_of::<f64>());
         memory::check_file(self.path, bytes as u64)
     }

@@ -3,8 +3,8 @@
 
 use super::columns::ColumnAssignment;
 use super::roles::{Role, UsedColumn};
-use crate::config::build::known_stretches;
 use crate::config::dominant::{Oscillation, remove_outliers, values_of};
+use crate::config::lowering::known_stretches;
 use crate::error::InputError;
 use crate::tables::{Duplicates, RepeatedTimes, Table, lines_in_words, repeated_times};
 use kmcfit_core::internals::signal::{is_kept_up, jumps, median, onset};

@@ -23,7 +23,7 @@ const LABELS: f64 = 45.0;
 const GAP: f64 = 10.0;
 /// Height of the axes: alone, side by side, and in a stack.
 const ALONE: f64 = 320.0;
-const BESIDE: f64 = 260.0;
+const SIDE_BY_SIDE: f64 = 260.0;
 const STACKED: f64 = 165.0;
 /// Length of the sample beside a label of the legend, and height of its rows.
 const SAMPLE: f64 = 28.0;
@@ -39,7 +39,7 @@ pub fn render(figure: &Figure) -> String {
     let width = WIDTH / columns as f64;
     let height = match (panels.len().div_ceil(columns), columns) {
         (1, 1) => ALONE,
-        (1, _) => BESIDE,
+        (1, _) => SIDE_BY_SIDE,
         _ => STACKED,
     };
     let mut body = String::new();

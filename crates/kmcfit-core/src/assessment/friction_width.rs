@@ -5,7 +5,7 @@
 //! that of the system, and no artefact of the smoothing.
 
 use super::Doubt;
-use super::score_tests::SIGNIFICANT;
+use super::score_statistics::SIGNIFICANT;
 use super::span::Span;
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;

@@ -17,9 +17,9 @@ mod input_jumps;
 mod input_pulses;
 mod interpolation_loss;
 mod large_covariance;
+mod larger_models;
 mod median_frequency;
 mod minimum;
-mod model_tests;
 mod parts;
 mod plausibility;
 mod record_error;
@@ -31,7 +31,7 @@ mod refit;
 mod residual_mean;
 mod rival_screen;
 mod rivals;
-mod score_tests;
+mod score_statistics;
 mod second_mode;
 mod span;
 mod statistics;
@@ -50,7 +50,7 @@ pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
 pub use large_covariance::LargeCovariance;
-pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
+pub use larger_models::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use parts::Parts;
 pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility};
 pub use record_error::RecordError;
@@ -68,7 +68,7 @@ use input_pulses::input_pulses;
 use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
 use rivals::amplitude_rival;
-use score_tests::{ScoreTests, missing};
+use score_statistics::{ScoreTests, missing};
 use second_mode::{second_modes, second_modes_in_place};
 use variation::variation_warnings;
 
@@ -170,7 +170,7 @@ impl FitAssessment {
             classifications: Vec::new(),
             classical: None,
             model_tests: ModelTests {
-                t_limit: score_tests::SIGNIFICANT,
+                t_limit: score_statistics::SIGNIFICANT,
                 p_limit: refinement::LEVEL,
                 ..ModelTests::default()
             },

@@ -1,7 +1,7 @@
 //! Errors of a record that no parameter of the model explains: a delay between input and response, clocks that run at different rates, an
 //! input of the wrong sign, and a channel off by a factor.
 //!
-//! Small errors are further candidates of the [score tests](super::score_tests); large ones are found by a search from which a refit starts. An
+//! Small errors are further candidates of the [score tests](super::score_statistics); large ones are found by a search from which a refit starts. An
 //! error is named where a refit with it explains the residuals.
 
 use super::at_once;

@@ -10,8 +10,8 @@
 //! has an F distribution. A nonlinear refit gives the same verdict at several times the cost. The test is of no use where residuals
 //! are far from noise, and for an estimate that a constraint holds; there it is left out.
 
+use super::larger_models::BasisComparison;
 use super::minimum::Minimum;
-use super::model_tests::BasisComparison;
 use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::identifiability::has_active_rows;

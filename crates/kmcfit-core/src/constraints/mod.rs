@@ -2,12 +2,12 @@
 //!
 //! A [`Constraint`] is a condition on coefficient functions; [`Constraint::build`] computes its rows.
 
-mod build;
+mod kinds;
 mod set;
 mod soft;
 mod violation;
 
 pub use crate::rows::Rows;
-pub use build::{Constraint, ConstraintError, Shape, TimeHistory};
+pub use kinds::{Constraint, ConstraintError, Shape, TimeHistory};
 pub use set::{Cone, ConeGroup, Constraints, RowGroup};
 pub use violation::TOLERANCE;

@@ -125,10 +125,10 @@ impl Bands {
         let equal: Vec<&ActiveRow> = active.iter().filter(|r| r.equality).collect();
         let bounded = active.iter().any(|r| !r.equality);
         let all: Vec<&ActiveRow> = active.iter().collect();
-        let loose = information.factor(&equal);
-        let tight = match bounded {
+        let without_bounds = information.factor(&equal);
+        let with_bounds = match bounded {
             true => information.factor(&all),
-            false => loose.clone(),
+            false => without_bounds.clone(),
         };
         let stride = problem.functions.nodes().div_ceil(MOST_NODES);
         let all = problem.functions.nodes();
@@ -139,24 +139,24 @@ impl Bands {
             false => NoiseVariants::of(problem, evaluation, Some(information.sensitivity())),
         };
         let directions = &information.sensitivity().directions;
-        let maker = Maker {
+        let computation = BandComputation {
             problem,
             theta,
             variants: variants.as_ref(),
             times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
             nodes,
             factors: match bounded {
-                true => vec![&tight, &loose],
-                false => vec![&loose],
+                true => vec![&with_bounds, &without_bounds],
+                false => vec![&without_bounds],
             },
             directions,
             bounds_of: bounds_of(problem.parameters(), &active),
             inwards: active.iter().map(|row| inwards(directions, row)).collect(),
         };
         let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
-            .map(|f| maker.function(f))
+            .map(|f| computation.function(f))
             .collect();
-        let values = problem.functions.values_at(theta, &maker.nodes);
+        let values = problem.functions.values_at(theta, &computation.nodes);
         let (means, means_of_ratios) = means_at(problem, theta);
         let means = means.into_iter();
         let functions = linearised
@@ -167,12 +167,12 @@ impl Bands {
                 let function = problem.functions.get(f);
                 let unit = function.quantity.unit();
                 let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
-                    maker.add_entries(f, maker.nodes[i], 1.0, into);
+                    computation.add_entries(f, computation.nodes[i], 1.0, into);
                 };
-                let degrees = maker.degrees(&entries);
+                let degrees = computation.degrees(&entries);
                 let at_nodes = values[f].clone();
-                let mean = maker.mean(mean, linear);
-                maker.band(
+                let mean = computation.mean(mean, linear);
+                computation.band(
                     (function.name(), unit),
                     at_nodes,
                     linear,
@@ -181,7 +181,7 @@ impl Bands {
                 )
             });
         let functions = functions.collect();
-        let undetermined = loose.undetermined.ncols();
+        let undetermined = without_bounds.undetermined.ncols();
         let mut notes = notes(problem, information, &active);
         if undetermined > 0 {
             notes.push(format!(
@@ -190,17 +190,17 @@ impl Bands {
         }
         Self {
             functions,
-            ratios: maker.ratios(&values, &linearised, means_of_ratios),
-            sigma: tight.variance.map(f64::sqrt),
+            ratios: computation.ratios(&values, &linearised, means_of_ratios),
+            sigma: with_bounds.variance.map(f64::sqrt),
             covariance: match problem.parameters() {
-                1..=FEW_PARAMETERS => information.of_parameters(&loose),
+                1..=FEW_PARAMETERS => information.of_parameters(&without_bounds),
                 _ => None,
             },
             undetermined,
             covariance_kind: information.kind(),
-            degrees_of_freedom: degrees_of_parameters(problem, maker.variants),
+            degrees_of_freedom: degrees_of_parameters(problem, computation.variants),
             notes,
-            times: maker.times,
+            times: computation.times,
         }
     }
 
@@ -247,7 +247,7 @@ fn bounds_of(parameters: usize, active: &[ActiveRow]) -> Vec<Vec<usize>> {
 /// Adds the entries of a value at a node in the parameters to a list.
 type AddEntries<'a> = dyn Fn(usize, &mut Vec<(usize, f64)>) + 'a;
 
-struct Maker<'a> {
+struct BandComputation<'a> {
     problem: &'a Problem,
     theta: &'a [f64],
     variants: Option<&'a NoiseVariants>,
@@ -262,7 +262,7 @@ struct Maker<'a> {
     inwards: Vec<(Vec<f64>, f64)>,
 }
 
-impl Maker<'_> {
+impl BandComputation<'_> {
     /// Slopes of the value of function `f` at node `i` along the scaled directions.
     fn slope(&self, f: usize, i: usize) -> Vec<f64> {
         let functions = &self.problem.functions;
@@ -362,20 +362,20 @@ impl Maker<'_> {
         };
         let (mut errors, mut sides) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for (i, value) in values.iter().enumerate() {
-            let tight = error(0, i);
-            let loose = match norms.len() {
-                1 => tight,
+            let with_bounds = error(0, i);
+            let without_bounds = match norms.len() {
+                1 => with_bounds,
                 _ => error(1, i),
             };
-            let (standard_error, side) = if !value.is_finite() || tight.is_nan() {
+            let (standard_error, side) = if !value.is_finite() || with_bounds.is_nan() {
                 (f64::INFINITY, BandSide::Both)
-            } else if loose == 0.0 {
+            } else if without_bounds == 0.0 {
                 (0.0, BandSide::Neither)
-            } else if tight <= HELD * loose {
+            } else if with_bounds <= HELD * without_bounds {
                 let side = function.map_or(BandSide::Both, |f| self.side(f, self.nodes[i]));
-                (loose, side)
+                (without_bounds, side)
             } else {
-                (tight, BandSide::Both)
+                (with_bounds, BandSide::Both)
             };
             errors.push(standard_error);
             sides.push(side);

@@ -85,7 +85,7 @@ impl Kernel for Predict<'_> {
             let mut row = (factor * value).row();
             if (offset, drift) != (0.0, 0.0) {
                 for (l, value) in row.iter_mut().enumerate().take(count) {
-                    *value = *value + offset + drift * channel.age(from + l);
+                    *value = *value + offset + drift * channel.elapsed_at(from + l);
                 }
             }
             match count {

@@ -134,7 +134,7 @@ impl Channel {
             Some(_) => gain * self.sensed_rate(view, i, value_at),
             None => 0.0,
         };
-        [value, 1.0, self.age(i), -rate, rate]
+        [value, 1.0, self.elapsed_at(i), -rate, rate]
     }
 
     /// Value of [`Channel::sensed`].
@@ -179,8 +179,9 @@ impl Channel {
             out.extend((0..self.len()).map(|i| self.observed_value(view, i)));
         } else {
             let [gain, offset, drift] = self.sensor().values(view.scalars);
-            let model =
-                |i: usize| gain * self.observed_value(view, i) + offset + drift * self.age(i);
+            let model = |i: usize| {
+                gain * self.observed_value(view, i) + offset + drift * self.elapsed_at(i)
+            };
             out.extend((0..self.len()).map(model));
         }
         if !self.filter().is_empty() {

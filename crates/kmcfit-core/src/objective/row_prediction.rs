@@ -83,7 +83,7 @@ impl<'a> RowSamples<'a> {
     pub fn predict_into(&mut self, out: &mut Vec<f64>) {
         let channel = self.channel;
         let [gain, offset, drift] = channel.sensor().values(self.view.scalars);
-        let model = |i: usize| gain * self.value(i) + offset + drift * channel.age(i);
+        let model = |i: usize| gain * self.value(i) + offset + drift * channel.elapsed_at(i);
         out.extend((0..channel.len()).map(model));
     }
 

@@ -431,7 +431,7 @@ impl Channel {
     }
 
     /// Time since the first sample, s.
-    pub fn age(&self, i: usize) -> f64 {
+    pub fn elapsed_at(&self, i: usize) -> f64 {
         self.times[i] - self.origin
     }
 

@@ -15,7 +15,7 @@ const LEVELS: usize = 3;
 /// Smallest change beside a cut sample, in quantisation steps: beside the peak of a slowly sampled wave it is one or two.
 const CHANGE: f64 = 10.0;
 /// Samples on either side of a cut sample in which the signal moves, and their smallest path relative to the range of the signal.
-const BESIDE: usize = 5;
+const NEIGHBOURS: usize = 5;
 const MOVES: f64 = 0.02;
 
 /// Largest and smallest value of the samples where they are cut off there, as beyond the range of a sensor or an amplifier: as by
@@ -75,8 +75,8 @@ fn moves_beside(values: &[f64], level: f64, least: f64) -> bool {
     values.chunk_by(|a, b| a == b).any(|same| {
         let (from, to) = (row, row + same.len());
         row = to;
-        let before = &values[from.saturating_sub(BESIDE)..from];
-        let after = &values[to..(to + BESIDE).min(values.len())];
+        let before = &values[from.saturating_sub(NEIGHBOURS)..from];
+        let after = &values[to..(to + NEIGHBOURS).min(values.len())];
         same[0] == level && path(before) > least && path(after) > least
     })
 }

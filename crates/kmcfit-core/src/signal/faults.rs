@@ -25,7 +25,7 @@ const SINGLE: std::ops::RangeInclusive<f64> = -0.93..=-0.4;
 /// Distance of a spike from the lines through the two samples before and after it, relative to that from the cubic.
 const OFF_LINE: f64 = 0.5;
 /// Samples on either side of a spike of which the deviations are compared.
-const BESIDE: usize = 20;
+const NEIGHBOURS: usize = 20;
 /// Ratio of the median absolute value to the standard deviation of Gaussian noise.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
@@ -108,7 +108,7 @@ impl Side {
 pub fn spikes(times: &[f64], values: &[f64]) -> Vec<usize> {
     let windows = times.windows(5).zip(values.windows(5));
     let distances: Vec<f64> = windows.map(|(t, x)| off_cubic(t, x)).collect();
-    if distances.len() <= 2 * BESIDE {
+    if distances.len() <= 2 * NEIGHBOURS {
         return Vec::new();
     }
     let deviation = |part: &[f64]| {
@@ -127,7 +127,7 @@ pub fn spikes(times: &[f64], values: &[f64]) -> Vec<usize> {
         if !misses(2.0 * b - a) || !misses(2.0 * c - d) {
             return false;
         }
-        let around = i.saturating_sub(BESIDE)..(i + BESIDE + 1).min(distances.len());
+        let around = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(distances.len());
         let beside = [i.checked_sub(1), Some(i + 1)].map(|i| i.and_then(|i| distances.get(i)));
         // Both have -2/3 of its distance, up to the noise.
         let is_single = beside

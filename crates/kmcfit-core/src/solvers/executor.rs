@@ -32,14 +32,14 @@ pub(super) fn search(
     start: &[f64],
     settings: &FitSettings,
     reference: Option<Reference>,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     let prepared = Prepared {
         parameters: start.to_vec(),
         evaluation: None,
-        spare: None,
+        workspace: None,
     };
-    search_prepared(problem, prepared, settings, reference, watch)
+    search_prepared(problem, prepared, settings, reference, observer)
 }
 
 /// Starting point of a search.
@@ -49,7 +49,7 @@ pub(super) struct Prepared {
     /// Evaluation, if already computed.
     pub evaluation: Option<Evaluation>,
     /// Storage for the first trial, if available.
-    pub spare: Option<Evaluation>,
+    pub workspace: Option<Evaluation>,
 }
 
 /// [`search`] from a prepared starting point.
@@ -58,13 +58,13 @@ pub(super) fn search_prepared(
     prepared: Prepared,
     settings: &FitSettings,
     reference: Option<Reference>,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     if settings.solver == Solver::EquationError {
         return Ok(equation_error::fit(
             problem,
             &prepared.parameters,
-            watch.observe(),
+            observer.observe(),
         ));
     }
     // Samples of a part of a record do not cover all nodes of the grid.
@@ -74,8 +74,8 @@ pub(super) fn search_prepared(
     }
     let settings = &settings;
     let mut method = step_rule(settings.solver);
-    if let Some(spare) = prepared.spare {
-        method.recycle(spare);
+    if let Some(workspace) = prepared.workspace {
+        method.recycle(workspace);
     }
     let run = SearchDriver {
         method,
@@ -87,7 +87,7 @@ pub(super) fn search_prepared(
         progress: None,
         trouble: None,
         outcome: None,
-        watch,
+        observer,
     };
     let result = Executor::new(problem, run)
         .configure(|state: SearchState| state.param(prepared.parameters))
@@ -137,7 +137,7 @@ struct SearchDriver<'a, 'w> {
     /// Error of the simulation at the start.
     trouble: Option<SimulationError>,
     outcome: Option<Outcome>,
-    watch: &'a mut Observer<'w>,
+    observer: &'a mut Observer<'w>,
 }
 
 struct SearchProgress {
@@ -193,7 +193,7 @@ impl SearchDriver<'_, '_> {
                 self.method.recycle(left.evaluation);
                 if let Some(row) = progress.recorder.rows.last() {
                     let (constraints, at) = (&work.problem().constraints, &progress.point);
-                    self.watch.iteration(row, || {
+                    self.observer.iteration(row, || {
                         let worst = constraints.largest_violation(&at.parameters)?;
                         Some(worst.relative.max(0.0))
                     });

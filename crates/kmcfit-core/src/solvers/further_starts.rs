@@ -47,7 +47,7 @@ pub(super) fn with_further_starts(
     start: &[f64],
     found: Fit,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     let searches = settings.has_several_starts() && settings.stopping.has_test();
     if !searches || problem.parameters() == 0 {
@@ -56,7 +56,7 @@ pub(super) fn with_further_starts(
     let mut further = FurtherStarts {
         problem,
         settings,
-        watch,
+        observer,
         found,
     };
     further.scan(start)?;
@@ -68,7 +68,7 @@ pub(super) fn with_further_starts(
 struct FurtherStarts<'a, 'w> {
     problem: &'a Problem,
     settings: &'a FitSettings,
-    watch: &'a mut Observer<'w>,
+    observer: &'a mut Observer<'w>,
     found: Fit,
 }
 
@@ -117,11 +117,11 @@ impl FurtherStarts<'_, '_> {
         let Self {
             problem, settings, ..
         } = *self;
-        self.watch.begin_attempt(strategy);
+        self.observer.begin_attempt(strategy);
         let from = problem.feasible_or(from.to_vec(), &self.found.best.parameters);
         let mut probing = settings.clone();
         probing.stopping.iterations = settings.stopping.iterations.min(PROBING_ITERATIONS);
-        let mut next = match search(problem, &from, &probing, None, self.watch) {
+        let mut next = match search(problem, &from, &probing, None, self.observer) {
             Ok(next) => next,
             Err(breakdown) => {
                 self.found
@@ -133,7 +133,7 @@ impl FurtherStarts<'_, '_> {
         let is_lower = next.best.evaluation.cost < self.found.best.evaluation.cost;
         if is_lower && next.outcome.status == Status::MaxIterations {
             let start = next.best.parameters.clone();
-            let rest = search(problem, &start, settings, None, self.watch)?;
+            let rest = search(problem, &start, settings, None, self.observer)?;
             next = with_round(next, rest, false);
         }
         self.found.attempts.push(Attempt::of(strategy, &next));

@@ -115,9 +115,9 @@ pub fn fit_on_refined_grids<T>(
     most: usize,
     on_nodes: &mut OnNodes,
     run: &mut RunFit<T>,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<RefinedFit<T>, SimulationError> {
-    let (further, fitted, fit) = run(problem, start, watch)?;
+    let (further, fitted, fit) = run(problem, start, observer)?;
     let from = nodes(problem);
     let mut found = RefinedFit {
         further,
@@ -144,7 +144,7 @@ pub fn fit_on_refined_grids<T>(
             false => carried(&found, &next),
         };
         let start = start.unwrap_or_else(|| next.start());
-        let Ok((further, fitted, fit)) = run(&next, &start, watch) else {
+        let Ok((further, fitted, fit)) = run(&next, &start, observer) else {
             found.notices.extend(error.and_then(|e| e.limited(here)));
             break;
         };

@@ -47,7 +47,7 @@ pub(super) fn with_input_errors(
     problem: &mut Problem,
     mut found: Fit,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     let mut measured = problem.clone();
     for _ in 0..ROUNDS {
@@ -57,7 +57,7 @@ pub(super) fn with_input_errors(
         let before = found.best.parameters.clone();
         let evaluation = measured.evaluate(&before)?;
         *problem = counted(&mut found, |_| with_errors_at(&mut measured, &evaluation));
-        let fit = search(problem, &before, settings, None, watch)?;
+        let fit = search(problem, &before, settings, None, observer)?;
         found = with_round(found, fit, false);
         if movement(problem, &before, &found) < AT_REST {
             break;

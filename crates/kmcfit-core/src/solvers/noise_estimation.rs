@@ -70,30 +70,30 @@ pub fn fit_with_noise_watched(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<(Problem, Fit), SimulationError> {
     let mut problem = problem.clone();
     let chooses = estimates_weights(&problem);
     if chooses {
         start_weights(&mut problem, start);
     }
-    let mut found = search_from_starts(&problem, start, settings, watch)?;
+    let mut found = search_from_starts(&problem, start, settings, observer)?;
     found = match chooses {
-        true => with_weights(&mut problem, found, settings, watch)?,
-        false => with_sigmas(&mut problem, found, settings, watch)?,
+        true => with_weights(&mut problem, found, settings, observer)?,
+        false => with_sigmas(&mut problem, found, settings, observer)?,
     };
     let before = found.best.evaluation.cost;
-    found = with_further_starts(&problem, start, found, settings, watch)?;
+    found = with_further_starts(&problem, start, found, settings, observer)?;
     if found.best.evaluation.cost < before {
         found = match chooses {
-            true => with_weights(&mut problem, found, settings, watch)?,
-            false => with_sigmas(&mut problem, found, settings, watch)?,
+            true => with_weights(&mut problem, found, settings, observer)?,
+            false => with_sigmas(&mut problem, found, settings, observer)?,
         };
     }
     if has_input_errors(&problem) {
-        found = with_input_errors(&mut problem, found, settings, watch)?;
+        found = with_input_errors(&mut problem, found, settings, observer)?;
     } else if may_correlate(&problem, settings) {
-        found = with_correlations(&mut problem, found, settings, watch)?;
+        found = with_correlations(&mut problem, found, settings, observer)?;
     }
     add_sigma_variances(&mut problem);
     if is_likelihood(settings) {
@@ -118,7 +118,7 @@ pub(super) fn with_sigmas(
     problem: &mut Problem,
     mut found: Fit,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     if !estimates_sigma(problem) {
         return Ok(found);
@@ -126,7 +126,7 @@ pub(super) fn with_sigmas(
     for _ in 0..ROUNDS {
         let change = update(problem, &found, parameter_share(problem), |_| true);
         let ended = is_ended(&found);
-        let next = search(problem, &found.best.parameters, settings, None, watch)?;
+        let next = search(problem, &found.best.parameters, settings, None, observer)?;
         found = with_round(found, next, ended);
         if ended || change < SETTLED {
             break;
@@ -140,7 +140,7 @@ fn with_weights(
     problem: &mut Problem,
     mut found: Fit,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     update(problem, &found, parameter_share(problem), |_| true);
     for _ in 0..WEIGHT_ROUNDS {
@@ -162,7 +162,7 @@ fn with_weights(
         *problem = next;
         let share = parameter_share(problem);
         let sigmas = update(problem, &found, share, |c| c.loss() != Loss::Squares);
-        let fit = search(problem, &found.best.parameters, settings, None, watch)?;
+        let fit = search(problem, &found.best.parameters, settings, None, observer)?;
         found = with_round(found, fit, false);
         if change.max(sigmas) < WEIGHTS_AT_REST {
             break;
@@ -185,7 +185,7 @@ fn with_correlations(
     problem: &mut Problem,
     mut found: Fit,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     let mut white = None;
     for pass in 0..PASSES {
@@ -201,7 +201,7 @@ fn with_correlations(
         white.get_or_insert_with(|| (problem.clone(), found.clone()));
         let rests = orders(&next) == orders(problem);
         let moved;
-        (found, moved) = refitted(problem, next, found, settings, watch)?;
+        (found, moved) = refitted(problem, next, found, settings, observer)?;
         if rests && moved < AT_REST {
             break;
         }
@@ -220,7 +220,7 @@ fn with_correlations(
             break;
         };
         let moved;
-        (found, moved) = refitted(problem, next, found, settings, watch)?;
+        (found, moved) = refitted(problem, next, found, settings, observer)?;
         if moved < AT_REST {
             break;
         }
@@ -254,15 +254,15 @@ fn refitted(
     next: Problem,
     found: Fit,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<(Fit, f64), SimulationError> {
     *problem = next;
     let before = found.best.parameters.clone();
-    let fit = search(problem, &before, settings, None, watch)?;
+    let fit = search(problem, &before, settings, None, observer)?;
     let mut found = with_round(found, fit, false);
     let is_refined = problem.channels().any(|c| !c.noise().covariance.is_empty());
     if !is_refined {
-        found = with_sigmas(problem, found, settings, watch)?;
+        found = with_sigmas(problem, found, settings, observer)?;
     }
     let moved = movement(problem, &before, &found);
     Ok((found, moved))

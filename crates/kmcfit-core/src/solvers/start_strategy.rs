@@ -50,12 +50,12 @@ pub(super) fn search_from_starts(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     if settings.solver == Solver::EquationError {
-        return search(problem, start, settings, None, watch);
+        return search(problem, start, settings, None, observer);
     }
-    let mut attempts = Attempts::new(problem, start, settings, watch);
+    let mut attempts = Attempts::new(problem, start, settings, observer);
     let lead = attempts.prepare();
     for strategy in attempts.strategies() {
         if attempts.attempt(strategy) {
@@ -74,7 +74,7 @@ struct Attempts<'a, 'w> {
     settings: &'a FitSettings,
     /// Settings of one attempt. Searches in a spurious minimum converge slowly, so the other starts are tried first.
     probing: FitSettings,
-    watch: &'a mut Observer<'w>,
+    observer: &'a mut Observer<'w>,
     /// True if several starting points may be tried.
     has_several: bool,
     truncated: Option<(StartStrategy, Prepared)>,
@@ -95,7 +95,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         problem: &'a Problem,
         start: &'a [f64],
         settings: &'a FitSettings,
-        watch: &'a mut Observer<'w>,
+        observer: &'a mut Observer<'w>,
     ) -> Self {
         let has_several = settings.has_several_starts();
         let mut probing = settings.clone();
@@ -107,7 +107,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             start,
             settings,
             probing,
-            watch,
+            observer,
             has_several,
             truncated: None,
             from_data: None,
@@ -131,7 +131,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         match (settings.initial, steps) {
             (Initial::Near, _) | (Initial::Functions, None) => Duration::ZERO,
             (Initial::Functions, Some(steps)) => {
-                let found = truncated_start(problem, steps, start, settings, self.watch);
+                let found = truncated_start(problem, steps, start, settings, self.observer);
                 self.refer(found.referred);
                 self.counts += found.counts;
                 self.timings += found.timings;
@@ -171,14 +171,14 @@ impl<'a, 'w> Attempts<'a, 'w> {
     /// Searches from one starting point; returns true after the last attempt.
     fn attempt(&mut self, strategy: StartStrategy) -> bool {
         let clock = Instant::now();
-        self.watch.begin_attempt(strategy);
+        self.observer.begin_attempt(strategy);
         let prepared = self.starting_point(strategy);
         let found = search_prepared(
             self.problem,
             prepared,
             &self.probing,
             self.reference,
-            self.watch,
+            self.observer,
         );
         match found {
             Ok(mut fit) => {
@@ -242,7 +242,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             StartStrategy::GrowingHorizon => {
                 let from = self.equation_error_start();
                 let (found, counts, timings) =
-                    growing_horizon_start(problem, from, &self.probing, self.watch);
+                    growing_horizon_start(problem, from, &self.probing, self.observer);
                 self.counts += counts;
                 self.timings += timings;
                 problem.feasible_or(found, start)
@@ -251,7 +251,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         Prepared {
             parameters,
             evaluation: None,
-            spare: None,
+            workspace: None,
         }
     }
 
@@ -271,7 +271,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 settings,
                 reference,
                 &mut self.attempts,
-                self.watch,
+                self.observer,
             )?;
         }
         fit.attempts = self.attempts;
@@ -286,7 +286,7 @@ fn continued(
     settings: &FitSettings,
     reference: Option<Reference>,
     attempts: &mut Vec<Attempt>,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<Fit, SimulationError> {
     let mut settings = settings.clone();
     let taken = fit.history.len() as u64;
@@ -295,8 +295,8 @@ fn continued(
         return Ok(fit);
     }
     let start = &fit.best.parameters;
-    watch.begin_attempt(StartStrategy::Continued);
-    let mut more = search(problem, start, &settings, reference, watch)?;
+    observer.begin_attempt(StartStrategy::Continued);
+    let mut more = search(problem, start, &settings, reference, observer)?;
     attempts.push(Attempt::of(StartStrategy::Continued, &more));
     let mut history = fit.history;
     let rows = std::mem::take(&mut more.history);

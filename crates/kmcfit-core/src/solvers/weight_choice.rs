@@ -26,8 +26,8 @@ pub fn choose_weight(
     which: &[usize],
     observe: &mut dyn FnMut(&IterationRecord),
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
-    let watch = &mut Observer::new(observe);
-    choose_weight_watched(problem, start, settings, rule, which, watch)
+    let observer = &mut Observer::new(observe);
+    choose_weight_watched(problem, start, settings, rule, which, observer)
 }
 
 /// [`choose_weight`] with an observer.
@@ -40,13 +40,13 @@ pub fn choose_weight_watched(
     settings: &FitSettings,
     rule: WeightRule,
     which: &[usize],
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     if let (WeightRule::Bic, [which]) = (rule, which) {
-        return choose_jumps(problem, start, settings, *which, watch);
+        return choose_jumps(problem, start, settings, *which, observer);
     }
     let (path, mut weighted, found) =
-        choose_by_discrepancy(problem, start, settings, which, watch)?;
+        choose_by_discrepancy(problem, start, settings, which, observer)?;
     if is_likelihood(settings) {
         mark_misspecified(&mut weighted, &found);
     }

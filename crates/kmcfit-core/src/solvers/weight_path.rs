@@ -40,13 +40,13 @@ pub(super) fn choose_by_discrepancy(
     start: &[f64],
     settings: &FitSettings,
     which: &[usize],
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     let mut walk = WeightPathSearch {
         problem,
         settings: settings.clone(),
         which,
-        watch,
+        observer,
         from: start.to_vec(),
         last: None,
         attempts: Vec::new(),
@@ -88,7 +88,7 @@ struct WeightPathSearch<'a, 'w> {
     problem: &'a Problem,
     settings: FitSettings,
     which: &'a [usize],
-    watch: &'a mut Observer<'w>,
+    observer: &'a mut Observer<'w>,
     from: Vec<f64>,
     last: Option<Outcome>,
     attempts: Vec<Attempt>,
@@ -123,8 +123,8 @@ impl WeightPathSearch<'_, '_> {
         let problem = self.problem.with_penalty_factor(self.which, weight);
         let from = std::mem::take(&mut self.from);
         let found = match self.last {
-            None => search_from_starts(&problem, &from, &self.settings, self.watch)?,
-            Some(_) => search(&problem, &from, &self.settings, None, self.watch)?,
+            None => search_from_starts(&problem, &from, &self.settings, self.observer)?,
+            Some(_) => search(&problem, &from, &self.settings, None, self.observer)?,
         };
         if self.last.is_none() {
             self.attempts.clone_from(&found.attempts);
@@ -154,7 +154,7 @@ impl WeightPathSearch<'_, '_> {
 
     /// Repeats the fit at a point of the path, with the attempts of the first fit.
     fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, SimulationError> {
-        let mut found = search(problem, from, &self.settings, None, self.watch)?;
+        let mut found = search(problem, from, &self.settings, None, self.observer)?;
         if self.ended()
             && let Some(outcome) = self.last.take()
         {
@@ -235,7 +235,7 @@ mod tests {
             problem: &problem,
             settings,
             which: &[0],
-            watch: &mut Observer::new(&mut observe),
+            observer: &mut Observer::new(&mut observe),
             from: start,
             last: None,
             attempts: Vec::new(),

@@ -69,7 +69,7 @@ pub(super) fn choose_jumps(
     start: &[f64],
     settings: &FitSettings,
     which: usize,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     let function = problem.variations[which].function;
     let mut walk = JumpSearch {
@@ -77,7 +77,7 @@ pub(super) fn choose_jumps(
         settings,
         which,
         function,
-        watch,
+        observer,
         attempts: Vec::new(),
         ended: None,
         counts: SolveCounts::default(),
@@ -130,7 +130,7 @@ struct JumpSearch<'a, 'w> {
     /// Index of the penalty.
     which: usize,
     function: usize,
-    watch: &'a mut Observer<'w>,
+    observer: &'a mut Observer<'w>,
     attempts: Vec<Attempt>,
     /// Outcome of a fit that was ended from outside.
     ended: Option<Outcome>,
@@ -205,10 +205,10 @@ impl JumpSearch<'_, '_> {
         is_first: bool,
     ) -> Result<Fit, SimulationError> {
         let found = match is_first {
-            true => search_from_starts(problem, from, self.settings, self.watch)?,
-            false => search(problem, from, self.settings, None, self.watch)?,
+            true => search_from_starts(problem, from, self.settings, self.observer)?,
+            false => search(problem, from, self.settings, None, self.observer)?,
         };
-        let found = with_sigmas(problem, found, self.settings, self.watch)?;
+        let found = with_sigmas(problem, found, self.settings, self.observer)?;
         if is_first {
             self.attempts.clone_from(&found.attempts);
         }
@@ -327,7 +327,7 @@ impl JumpSearch<'_, '_> {
             ..self.settings.clone()
         };
         let (reduced, found) =
-            fit_with_noise_watched(&reduced, &candidate.parameters, &settings, self.watch)?;
+            fit_with_noise_watched(&reduced, &candidate.parameters, &settings, self.observer)?;
         let mut found = found.with_work_of(self.counts, self.timings, self.elapsed);
         found.attempts.clone_from(&self.attempts);
         if let Some(outcome) = self.ended.take() {

@@ -103,7 +103,7 @@ impl Lbfgs {
             at,
             x,
             direction: &direction,
-            spare: Some(work.problem().workspace()),
+            workspace: Some(work.problem().workspace()),
             trial: None,
             accepted: None,
             work,
@@ -299,7 +299,7 @@ struct Trials<'a, 'w, 'q, 'p> {
     at: &'a Coordinates<'p>,
     x: Vec<f64>,
     direction: &'a [f64],
-    spare: Option<Evaluation>,
+    workspace: Option<Evaluation>,
     trial: Option<Trial>,
     /// Lowest trial with sufficient decrease.
     accepted: Option<Accepted>,
@@ -326,8 +326,8 @@ impl LineFunction for Trials<'_, '_, '_, '_> {
         let mut x = self.x.clone();
         add_scaled(&mut x, length, self.direction);
         let parameters = self.at.back(&x);
-        let mut evaluation = match (self.spare.take(), self.trial.take()) {
-            (Some(spare), _) => spare,
+        let mut evaluation = match (self.workspace.take(), self.trial.take()) {
+            (Some(workspace), _) => workspace,
             (None, Some(used)) => used.evaluation,
             (None, None) => self.work.problem().workspace(),
         };
@@ -343,7 +343,7 @@ impl LineFunction for Trials<'_, '_, '_, '_> {
                 Some(cost)
             }
             Err(_) => {
-                self.spare = Some(evaluation);
+                self.workspace = Some(evaluation);
                 None
             }
         }

@@ -32,14 +32,14 @@ fn a_continued_fit_has_the_work_of_both() {
     assert!(!snapshots.is_empty());
     let mut attempts = Vec::new();
     let mut observe = |_: &IterationRecord| {};
-    let mut watch = Observer::new(&mut observe);
+    let mut observer = Observer::new(&mut observe);
     let whole = continued(
         &problem,
         first,
         &settings(5),
         None,
         &mut attempts,
-        &mut watch,
+        &mut observer,
     )
     .unwrap();
     let numbers: Vec<u64> = whole.history.iter().map(|row| row.iteration).collect();

@@ -17,7 +17,7 @@ pub(in crate::solvers) fn growing_horizon_start(
     problem: &Problem,
     from: Vec<f64>,
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> (Vec<f64>, SolveCounts, Timings) {
     let (mut counts, mut timings) = (SolveCounts::default(), Timings::default());
     let mut parameters = from;
@@ -25,7 +25,8 @@ pub(in crate::solvers) fn growing_horizon_start(
     short.stopping.iterations = HORIZON_ITERATIONS;
     for share in HORIZONS {
         let part = problem.truncated(share);
-        let found = watch.unreported(|watch| search(&part, &parameters, &short, None, watch));
+        let found =
+            observer.unreported(|observer| search(&part, &parameters, &short, None, observer));
         if let Ok(fit) = found {
             counts += fit.counts;
             timings += fit.timings;

@@ -23,14 +23,14 @@ pub(super) struct Referred {
     /// Time by kind of work.
     pub timings: Timings,
     /// Storage of the evaluation.
-    pub spare: Option<Evaluation>,
+    pub workspace: Option<Evaluation>,
 }
 
 /// Evaluates a problem at the start values.
 pub(super) fn reference(problem: &Problem, start: &[f64], settings: &FitSettings) -> Referred {
     let mut timings = Timings::default();
-    let spare = timed(&mut timings.forward, || problem.evaluate(start)).ok();
-    let reference = spare.as_ref().map(|evaluation| Reference {
+    let workspace = timed(&mut timings.forward, || problem.evaluate(start)).ok();
+    let reference = workspace.as_ref().map(|evaluation| Reference {
         norm_squared: timed(&mut timings.adjoint, || {
             problem.gradient(start, evaluation, settings.gradient)
         })
@@ -40,6 +40,6 @@ pub(super) fn reference(problem: &Problem, start: &[f64], settings: &FitSettings
     Referred {
         reference,
         timings,
-        spare,
+        workspace,
     }
 }

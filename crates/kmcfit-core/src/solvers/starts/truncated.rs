@@ -147,11 +147,11 @@ pub(in crate::solvers) fn truncated_start(
     steps: usize,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> TruncatedStart {
     let clock = Instant::now();
     let (part, mut referred) = threads::both(
-        || fit_part(problem, steps, start, settings, watch),
+        || fit_part(problem, steps, start, settings, observer),
         || reference(problem, start, settings),
     );
     let Some(part) = part else {
@@ -171,9 +171,12 @@ pub(in crate::solvers) fn truncated_start(
     at_start.adjoint = at_start.adjoint.min(rest - at_start.forward);
     let mut timings = part.fit.timings;
     timings.forward += part.evaluating;
-    let spare = referred.spare.take();
+    let workspace = referred.workspace.take();
     TruncatedStart {
-        start: part.better.map(|better| Prepared { spare, ..better }),
+        start: part.better.map(|better| Prepared {
+            workspace,
+            ..better
+        }),
         referred,
         counts: part.fit.counts,
         timings,
@@ -187,7 +190,7 @@ fn fit_part(
     steps: usize,
     start: &[f64],
     settings: &FitSettings,
-    watch: &mut Observer,
+    observer: &mut Observer,
 ) -> Option<PartialFit> {
     let mut short = settings.clone();
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
@@ -195,7 +198,7 @@ fn fit_part(
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
     let mut search_part = |steps| {
         let part = first_steps(problem, steps)?;
-        let found = watch.unreported(|watch| search(&part, start, &short, None, watch));
+        let found = observer.unreported(|observer| search(&part, start, &short, None, observer));
         found.ok()
     };
     let mut fit = search_part(steps)?;
@@ -214,7 +217,7 @@ fn fit_part(
                 let better = is_moved.then_some(Prepared {
                     evaluation,
                     parameters,
-                    spare: None,
+                    workspace: None,
                 });
                 return Some(PartialFit {
                     fit,
@@ -274,12 +277,12 @@ mod tests {
         *channel = channel.clone().with_samples(samples.collect());
         let start = problem.start();
         let mut ignore = |_: &_| {};
-        let mut watch = Observer::new(&mut ignore);
+        let mut observer = Observer::new(&mut ignore);
         let settings = FitSettings::default();
         let first = first_steps(&problem, 2048).expect("a part");
-        let of_first = search(&first, &start, &settings, None, &mut watch).expect("a response");
+        let of_first = search(&first, &start, &settings, None, &mut observer).expect("a response");
         assert!(problem.evaluate(&of_first.best.parameters).is_err());
-        let found = truncated_start(&problem, 2048, &start, &settings, &mut watch);
+        let found = truncated_start(&problem, 2048, &start, &settings, &mut observer);
         let prepared = found.start.expect("a start");
         assert!(prepared.evaluation.is_some(), "{:?}", prepared.parameters);
     }

@@ -104,7 +104,7 @@ pub(super) fn unsensed(channel: &Channel, scalars: &[f64]) -> (Vec<f64>, f64) {
     let plain = |(i, sample): (usize, &f64)| match filtered {
         // The filter has removed the offset.
         true => sample / gain,
-        false => (sample - offset - drift * channel.age(i)) / gain - channel.base_at(i),
+        false => (sample - offset - drift * channel.elapsed_at(i)) / gain - channel.base_at(i),
     };
     let values = channel.observed().iter().enumerate().map(plain);
     (values.collect(), gain)

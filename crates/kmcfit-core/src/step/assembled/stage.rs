@@ -92,7 +92,7 @@ pub(super) struct Internal<T> {
 
 /// Why a stage has no solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Trouble {
+pub(crate) enum Unsolved {
     /// The matrix of masses is not positive definite.
     Mass,
     /// Newton's method does not converge.
@@ -144,7 +144,7 @@ impl<T: Scalar> Stage<T> {
         structure: &Structure,
         h: f64,
         [q, v, z]: [&[T]; 3],
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Unsolved> {
         let n = structure.coordinates();
         let zero = q[0].like(0.0);
         self.place_supports(n);
@@ -173,7 +173,7 @@ impl<T: Scalar> Stage<T> {
         structure: &Structure,
         h: f64,
         [q, v, z]: [&[T]; 3],
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Unsolved> {
         let n = structure.coordinates();
         let size = |x: &[T]| x.iter().map(|x| x.value().abs()).fold(0.0, f64::max);
         let (mut norm, mut length, mut further) = (f64::INFINITY, 1.0, T::FURTHER);
@@ -201,11 +201,11 @@ impl<T: Scalar> Stage<T> {
                 norm = f64::INFINITY;
             }
         }
-        Err(Trouble::Newton)
+        Err(Unsolved::Newton)
     }
 
     /// Replaces the residual by the step that it asks for, and takes it.
-    fn newton_step(&mut self, structure: &Structure, h: f64) -> Result<(), Trouble> {
+    fn newton_step(&mut self, structure: &Structure, h: f64) -> Result<(), Unsolved> {
         self.factorise(structure, h)?;
         self.matrix.solve(&mut self.work);
         for (a, step) in self.a.iter_mut().zip(&self.work) {
@@ -221,7 +221,7 @@ impl<T: Scalar> Stage<T> {
         h: f64,
         [q, v, z]: [&[T]; 3],
         accelerations: impl Iterator<Item = T>,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Unsolved> {
         let n = structure.coordinates();
         self.place_supports(n);
         let each = self.a[..n].iter_mut().zip(accelerations);
@@ -251,7 +251,7 @@ impl<T: Scalar> Stage<T> {
     }
 
     /// Internal states at the stage for elongations there, from those `z` that it starts from, with their rates: `z_s = z + h z'`.
-    fn settle(&mut self, structure: &Structure, h: f64, z: &[T]) -> Result<(), Trouble> {
+    fn settle(&mut self, structure: &Structure, h: f64, z: &[T]) -> Result<(), Unsolved> {
         self.z.copy_from_slice(z);
         for k in 0..self.internal.len() {
             let mut further = T::FURTHER;
@@ -274,7 +274,7 @@ impl<T: Scalar> Stage<T> {
                     further -= 1;
                 }
                 if iteration == ITERATIONS || !change.value().is_finite() {
-                    return Err(Trouble::Newton);
+                    return Err(Unsolved::Newton);
                 }
             }
         }
@@ -365,7 +365,7 @@ impl<T: Scalar> Stage<T> {
     }
 
     /// Factorises `M + h C + h^2 K`; again only where values changed on which it depends.
-    pub fn factorise(&mut self, structure: &Structure, h: f64) -> Result<(), Trouble> {
+    pub fn factorise(&mut self, structure: &Structure, h: f64) -> Result<(), Unsolved> {
         let count = structure.inertias().len();
         let functions = match h == 0.0 {
             true => &self.values.functions[..count],
@@ -396,7 +396,7 @@ impl<T: Scalar> Stage<T> {
             true => Ok(()),
             false => {
                 self.factorised.clear();
-                Err(Trouble::Mass)
+                Err(Unsolved::Mass)
             }
         }
     }

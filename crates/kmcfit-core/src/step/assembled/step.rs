@@ -1,7 +1,7 @@
 //! Steps of a structure, their tangents and their transposes, stage by stage.
 
 use super::super::tableau::{At, MIDPOINT, RK4};
-use super::stage::{Scalar, Stage, StageValues, Trouble};
+use super::stage::{Scalar, Stage, StageValues, Unsolved};
 use super::stage_derivatives::StageShares;
 use crate::structure::Structure;
 use crate::system::Method;
@@ -76,7 +76,7 @@ impl<'a, T: Scalar> Steps<'a, T> {
         source: &impl Source<T>,
         step: usize,
         x: &mut [T],
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Unsolved> {
         let (n, scheme) = (self.structure.coordinates(), self.scheme);
         let h = self.dt * scheme.implicit;
         self.sum.copy_from_slice(x);
@@ -105,7 +105,7 @@ impl Steps<'_, f64> {
         step: usize,
         x: &mut [f64],
         next: Option<&[f64]>,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Unsolved> {
         let (n, dt, scheme) = (self.structure.coordinates(), self.dt, self.scheme);
         let h = dt * scheme.implicit;
         match (self.stages.as_mut_slice(), next) {

@@ -3,7 +3,7 @@
 use super::super::Trajectory;
 use super::super::error::Cause;
 use super::super::tableau::At;
-use super::stage::{StageValues, Trouble};
+use super::stage::{StageValues, Unsolved};
 use super::stage_derivatives::StageShares;
 use super::step::{Source, Steps};
 use crate::simd::LANES;
@@ -105,10 +105,10 @@ impl<'a> Motion<'a> {
         Some(self.method.stability_limit() / rate)
     }
 
-    fn error(node: usize, trouble: Trouble) -> MotionError {
-        let cause = match trouble {
-            Trouble::Mass => Cause::Mass,
-            Trouble::Newton => Cause::NoConvergence,
+    fn error(node: usize, unsolved: Unsolved) -> MotionError {
+        let cause = match unsolved {
+            Unsolved::Mass => Cause::Mass,
+            Unsolved::Newton => Cause::NoConvergence,
         };
         MotionError { cause, node }
     }
@@ -125,7 +125,7 @@ impl<'a> Motion<'a> {
         let mut x = initial.to_vec();
         states.write(0, &x);
         for i in 0..states.nodes() - 1 {
-            (steps.advance(self, i, &mut x)).map_err(|trouble| Self::error(i, trouble))?;
+            (steps.advance(self, i, &mut x)).map_err(|unsolved| Self::error(i, unsolved))?;
             states.write(i + 1, &x);
         }
         match states.is_finite() {
@@ -168,7 +168,7 @@ impl<'a> Motion<'a> {
             states.read(i, &mut x);
             states.read(i + 1, &mut next);
             (steps.linearise(self, i, &mut x, Some(&next)))
-                .map_err(|trouble| Self::error(i, trouble))?;
+                .map_err(|unsolved| Self::error(i, unsolved))?;
             steps.pull(&mut y, &mut shares, |at, shares| {
                 let [left, right] = at.shares();
                 let nodes = &mut gathered[i % LANES * functions..][..2 * functions];
@@ -230,7 +230,7 @@ impl<'a> Motion<'a> {
             states.read(i, &mut x);
             states.read(i + 1, &mut next);
             (steps.linearise(self, i, &mut x, Some(&next)))
-                .map_err(|trouble| Self::error(i, trouble))?;
+                .map_err(|unsolved| Self::error(i, unsolved))?;
             for ((out, change), (functions, _)) in all.iter_mut().zip(directions) {
                 steps.push(&Changes(functions), i, change);
                 out.write(i + 1, change);
@@ -245,7 +245,7 @@ impl<'a> Motion<'a> {
         &self,
         i: usize,
         x: &mut [f64],
-    ) -> Result<Vec<StepRow>, Trouble> {
+    ) -> Result<Vec<StepRow>, Unsolved> {
         let mut steps = self.steps();
         steps.linearise(self, i, x, None)?;
         let mut shares = StageShares::zeros(self.structure);

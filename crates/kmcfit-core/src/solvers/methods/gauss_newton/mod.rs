@@ -48,7 +48,7 @@ pub struct GaussNewton {
     /// Change of the last step below the rounding error of the cost.
     last_change: Option<f64>,
     /// Storage for the next trial.
-    spare: Option<Evaluation>,
+    workspace: Option<Evaluation>,
 }
 
 impl Default for GaussNewton {
@@ -57,7 +57,7 @@ impl Default for GaussNewton {
             damping: FIRST_DAMPING,
             first_cost: None,
             last_change: None,
-            spare: None,
+            workspace: None,
         }
     }
 }
@@ -70,7 +70,7 @@ impl StepRule for GaussNewton {
             return Step::Minimum(Reason::ZeroCost);
         }
         let mut linear = LinearisedProblem::new(work, point);
-        let mut evaluation = self.spare.take().unwrap_or_else(|| problem.workspace());
+        let mut evaluation = self.workspace.take().unwrap_or_else(|| problem.workspace());
         let before = self.damping;
         while self.damping <= MOST_DAMPING {
             linear.damp(self.damping * point.evaluation.cost);
@@ -133,7 +133,7 @@ impl StepRule for GaussNewton {
     }
 
     fn recycle(&mut self, evaluation: Evaluation) {
-        self.spare = Some(evaluation);
+        self.workspace = Some(evaluation);
     }
 }
 

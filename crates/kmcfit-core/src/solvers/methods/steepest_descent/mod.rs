@@ -21,7 +21,7 @@ const LONGEST: f64 = 5.0;
 /// order of operations: the results are the same bits.
 #[derive(Default)]
 pub struct SteepestDescent {
-    spare: Vec<Evaluation>,
+    workspace: Vec<Evaluation>,
 }
 
 /// A trial that lowers the cost.
@@ -54,7 +54,7 @@ impl StepRule for SteepestDescent {
     }
 
     fn recycle(&mut self, evaluation: Evaluation) {
-        self.spare.push(evaluation);
+        self.workspace.push(evaluation);
     }
 }
 
@@ -70,10 +70,10 @@ impl SteepestDescent {
         let mut best = None;
         for &length in lengths {
             let parameters = trial(point, length);
-            let mut evaluation = take(&mut self.spare, problem);
+            let mut evaluation = take(&mut self.workspace, problem);
             let found = problem.evaluate_for(mode, &parameters, &mut evaluation);
             if found.is_err() {
-                self.spare.push(evaluation);
+                self.workspace.push(evaluation);
                 continue;
             }
             let trial = Best {
@@ -81,15 +81,15 @@ impl SteepestDescent {
                 parameters,
                 evaluation,
             };
-            trial.or_lower(&mut best, point, &mut self.spare);
+            trial.or_lower(&mut best, point, &mut self.workspace);
         }
         best
     }
 }
 
 impl Best {
-    /// Replaces `best` if its cost is strictly lower than that of `best` and of the point; unused storage is added to `spare`.
-    fn or_lower(self, best: &mut Option<Best>, point: &Iterate, spare: &mut Vec<Evaluation>) {
+    /// Replaces `best` if its cost is strictly lower than that of `best` and of the point; unused storage is added to `workspace`.
+    fn or_lower(self, best: &mut Option<Best>, point: &Iterate, workspace: &mut Vec<Evaluation>) {
         let lowest = best
             .as_ref()
             .map_or(point.evaluation.cost, |b| b.evaluation.cost);
@@ -97,7 +97,7 @@ impl Best {
             true => best.replace(self),
             false => Some(self),
         };
-        spare.extend(left.map(|left| left.evaluation));
+        workspace.extend(left.map(|left| left.evaluation));
     }
 }
 
@@ -110,8 +110,8 @@ fn lengths(point: &Iterate) -> Vec<f64> {
 }
 
 /// Storage for an evaluation.
-fn take(spare: &mut Vec<Evaluation>, problem: &Problem) -> Evaluation {
-    spare.pop().unwrap_or_else(|| problem.workspace())
+fn take(workspace: &mut Vec<Evaluation>, problem: &Problem) -> Evaluation {
+    workspace.pop().unwrap_or_else(|| problem.workspace())
 }
 
 /// Parameters `p - length g`.

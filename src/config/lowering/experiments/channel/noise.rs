@@ -3,7 +3,7 @@
 use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
 use crate::config::alternatives::ScalarOr;
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::{CorrelationName, LossName};
 use crate::config::values::Sigma;
 use crate::error::InputError;

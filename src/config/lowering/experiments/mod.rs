@@ -13,7 +13,7 @@ mod unit;
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::{
     EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
     SensorSpec,

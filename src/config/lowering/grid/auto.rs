@@ -9,7 +9,7 @@
 //! the target. For records without a spectrum (too few or equal samples) the step is the sampling interval.
 
 use super::FinerNodes;
-use crate::config::build::experiments::RawRecord;
+use crate::config::lowering::experiments::RawRecord;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::signal::Spectrum;

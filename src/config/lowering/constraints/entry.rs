@@ -3,8 +3,8 @@
 //! Units: bounds, means and values in the unit of the function, slopes in that unit per s, integrals in that unit times s, times in s,
 //! frequencies in Hz, ratios in the unit of the first function per that of the second; damping ratios are dimensionless.
 
-use crate::config::build::Place;
-use crate::config::build::functions::history;
+use crate::config::lowering::Place;
+use crate::config::lowering::functions::history;
 use crate::config::spec::{ConstraintSpec, RangeSpec};
 use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;

@@ -1,6 +1,6 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;

@@ -2,7 +2,7 @@
 
 use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::{
     self as config, Basis, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec, PenaltyKind,
     WeightRule,

@@ -3,7 +3,7 @@
 use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::{CandidateSpec, EquivalentSpec, ProfileSpec, StudySpec};
 use crate::config::values::{Count, Number};
 use crate::error::InputError;

@@ -15,7 +15,7 @@
 use super::Doubt;
 use super::extension::extended;
 use super::interpolation_loss::evaluation_with_cubics;
-use super::model_tests::{Extension, ExtensionTest};
+use super::larger_models::{Extension, ExtensionTest};
 use super::record_errors::small_error;
 use super::record_parameters::{self, RecordColumns, RecordParameter};
 use super::refinement::applies;

@@ -1,7 +1,7 @@
 //! Sampling of a channel: equal spacing, decimation, and the band-pass filter.
 
 use super::super::column_samples;
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
 use crate::number_format::count;

@@ -8,8 +8,8 @@ use super::data_facts::RecordNotes;
 use super::faults::{Column, is_coarse, quantisation_step};
 use super::{ChannelNote, names};
 use crate::config::alternatives::ScalarOr;
-use crate::config::build::Place;
-use crate::config::build::experiments::Entry;
+use crate::config::lowering::Place;
+use crate::config::lowering::experiments::Entry;
 use crate::config::spec::{
     ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
 };

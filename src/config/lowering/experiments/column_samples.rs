@@ -4,7 +4,7 @@ use super::Entry;
 use super::data_facts::{FIRST, MEAN, MERGED, MOST_PLACES, RecordNotes, fact};
 use super::unit::QuantityColumn;
 use crate::config::alternatives::{OneOrList, ScalarOr};
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::config::values::{ColumnId, Text};
 use crate::error::{InputError, Location};

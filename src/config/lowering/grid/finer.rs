@@ -1,6 +1,6 @@
 //! Numbers of nodes of automatic grids that are finer than the first one.
 
-use crate::config::build::experiments::RawRecord;
+use crate::config::lowering::experiments::RawRecord;
 use crate::finding::Finding;
 
 /// Most nodes per sample of a refined grid with a stated `auto`, and of one without a statement; the first one has fewer

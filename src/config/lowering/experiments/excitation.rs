@@ -4,7 +4,7 @@ use super::Entry;
 use super::column_samples::{self, ColumnRequest, ColumnSamples};
 use super::data_facts::{RecordNotes, USED};
 use super::faults::{Column, is_coarse, quantisation_step};
-use crate::config::build::Place;
+use crate::config::lowering::Place;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::config::values::Number;
 use crate::error::InputError;
