@@ -82,6 +82,16 @@ impl FittedModel<'_> {
         (summary, found)
     }
 
+    /// The doubts of the assessment.
+    pub(super) fn doubts(&self) -> Vec<Doubt> {
+        let assessment = self.run_assessment.assessment.iter();
+        let warnings = assessment.flat_map(|a| a.plausibility.warnings.iter().cloned());
+        let missing = self.run_assessment.missing_terms.iter();
+        warnings
+            .chain(missing.map(|term| Doubt::MissingTerm(*term)))
+            .collect()
+    }
+
     /// The jumps found in a function, with the levels between them.
     fn jumps(&self, jumps: &Jumps) -> Finding {
         let problem = &self.model.problem;

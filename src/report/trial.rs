@@ -76,8 +76,7 @@ pub fn advice(
     found.extend(others);
     found.truncate(MOST);
     if found.is_empty() && is_unexplained(document) {
-        let mut reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
-        found.push(match reasons.any(|reason| reason.kind == "second_mode") {
+        found.push(match document.has_two_modes() {
             true => Finding::new(
                 "two_modes",
                 "one oscillator cannot have two modes: measure or excite where one of them is at rest, or fit a part of the record in which one alone moves",

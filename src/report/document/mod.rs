@@ -17,7 +17,7 @@ use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
+    ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
@@ -48,6 +48,9 @@ pub struct ResultDocument {
     /// confidence intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
+    /// The doubts among them, for advice; not in the file.
+    #[serde(skip)]
+    pub(super) doubts: Vec<Doubt>,
     /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
     #[serde(default, skip_serializing_if = "Estimates::is_empty")]
     pub estimates: Estimates,
@@ -325,9 +328,10 @@ impl ResultDocument {
         warnings.map(|w| w.text.clone()).filter(is_other).collect()
     }
 
-    /// The first warning of this kind.
-    pub(super) fn fit_warning(&self, kind: &str) -> Option<&Finding> {
-        self.fit_warnings().find(|warning| warning.kind == kind)
+    /// True where the fit or the data show two modes.
+    pub(super) fn has_two_modes(&self) -> bool {
+        let mut reasons = self.verdict.iter().flat_map(|verdict| &verdict.reasons);
+        reasons.any(|reason| matches!(reason.kind.as_str(), "second_mode" | "two_modes"))
     }
 
     /// True if a previous fit estimated the standard deviation of a channel, which changes the cost of the last one.

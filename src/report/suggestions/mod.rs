@@ -1,28 +1,26 @@
 //! Suggestions: changes of the model that may explain what the fit does not, and steps outside the model, the most urgent first. A change is
 //! [tried](super::trial) before it is recommended.
 
+mod records;
 mod residuals;
+mod terms;
 
 use super::document::{ExperimentSummary, ResultDocument};
 use crate::config::Model;
 use crate::escape::shell_quoted;
 use crate::finding::Finding;
 use crate::number_format::significant;
-use kmcfit_core::internals::assessment::{EXACT, POOR};
+use kmcfit_core::internals::assessment::{Doubt, EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
-use kmcfit_core::internals::functions::{CoefficientKind, ScalarValue};
-use kmcfit_core::internals::record::{BaseMotion, Waveform};
-use kmcfit_core::internals::signal::{Interpolation, Signal};
 use kmcfit_core::internals::solvers::{FEW_PARAMETERS, Solver, StartStrategy, Status};
+use records::{about_disturbance, about_interpolation, about_records};
 use residuals::{about_misfit, about_patterns};
-use serde::Deserialize;
+use terms::{about_friction, about_terms};
 
 /// Most pieces of advice.
 pub const MOST: usize = 3;
 /// Largest change of the response by halving the step, relative to its peak.
 const COARSE: f64 = 1e-3;
-/// Shift of the estimates by half the width of Coulomb friction at which a smaller one aims, in standard errors.
-const WIDTH_SHIFT: f64 = 0.06;
 
 /// What a suggestion asks for.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +119,7 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     steps.extend(about_friction(document));
     steps.extend(about_disturbance(document, model));
     steps.extend(about_interpolation(document));
-    if document.fit_warning("time_or_amplitude").is_some() {
+    if has(document, |doubt| matches!(doubt, Doubt::TimeOrAmplitude(_))) {
         steps.push(Suggestion::outside(
             "second_amplitude",
             "measure a record at a second amplitude (half or twice) and fit both: it shows whether the coefficients depend on time or on amplitude",
@@ -140,6 +138,11 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
         }
     }
     in_file
+}
+
+/// True if the fit has such a doubt.
+fn has(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> bool {
+    document.doubts.iter().any(is_meant)
 }
 
 /// The suggestions as advice without trials, where the model file is not at hand.
@@ -242,7 +245,9 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
         false => half.change_per_residual,
     };
     // A coefficient that varies within a period is rough on every grid.
-    let is_fast = document.fit_warning("fast_variation").is_some();
+    let is_fast = has(document, |doubt| {
+        matches!(doubt, Doubt::FastVariation { .. })
+    });
     if is_fast || half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
@@ -267,201 +272,23 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
     ))
 }
 
-/// Delays, in samples, like that of an input held between its samples.
-const HALF_SAMPLE: std::ops::RangeInclusive<f64> = 0.4..=0.6;
-
-/// Override for the gain of a channel that is a factor of the given one.
-fn changed_gain(model: &Model, i: usize, channel: &str, factor: f64) -> String {
-    let mut channels = model.problem.experiments[i].channels.iter();
-    let known = channels.find(|c| c.kind().name() == channel);
-    let given = known.map_or(1.0, |c| match c.sensor().gain {
-        ScalarValue::Known(gain) => gain,
-        ScalarValue::Estimated(_) => 1.0,
-    });
-    let gain = written(given * factor);
-    format!("experiments.{i}.sensors.{channel}.gain={gain}")
-}
-
-/// The measured input of an experiment, with its key in a model file.
-fn sampled_input(model: &Model, i: usize) -> Option<(&'static str, &Signal)> {
-    let input = &model.problem.experiments[i].input;
-    match (&input.force, &input.base) {
-        (Some(Waveform::Samples(signal)), _) => Some(("force", signal)),
-        (_, Some(BaseMotion::Acceleration(signal))) => Some(("base", signal)),
-        _ => None,
-    }
-}
-
-/// Correction of an error of a record.
-fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
-    document.fit_warnings().find_map(|warning| {
-        let experiment = warning.said("experiment");
-        match warning.kind.as_str() {
-            "channel_factor" => {
-                let channel = warning.said("channel")?;
-                let factor = warning.number("factor")?;
-                let gain = |i: usize| vec![changed_gain(model, i, &channel, factor)];
-                Some(Suggestion::change(
-                    "scale_channel",
-                    format!("correct the unit of the {channel} or of the other channels and the input (`units`), or state the gain of its sensor"),
-                    of_channel(document, &channel, gain),
-                ))
-            }
-            "input_sign" => {
-                let i = place(document, &experiment?)?;
-                let record = &document.experiments[i];
-                let gains = (record.channels.iter()).map(|c| changed_gain(model, i, &c.kind, -1.0));
-                Some(Suggestion::change(
-                    "reverse_input",
-                    format!("reverse the sign of the input of {} in its file, or that of the response", record.name),
-                    gains.collect(),
-                ))
-            }
-            "delay" => {
-                let samples = warning.number("samples")?;
-                let i = place(document, &experiment?)?;
-                let record = &document.experiments[i];
-                let is_force = record.driven_by.iter().any(|d| d == "force");
-                let input = if is_force { "force" } else { "base" };
-                let channel = match record.channels.as_slice() {
-                    [only] => only.kind.as_str(),
-                    _ if is_force => "force",
-                    _ => "base_acceleration",
-                };
-                let is_half = HALF_SAMPLE.contains(&samples.abs());
-                let (words, change) = match (is_half, samples > 0.0) {
-                    (true, true) => ("the lag is that of an input held between its samples", format!("{input}.interpolation=hold")),
-                    (true, false) => ("the lead is that of an input that is not held between its samples", format!("{input}.interpolation=cubic")),
-                    (false, _) => ("estimate the delay", format!("sensors.{channel}.delay=estimate")),
-                };
-                Some(Suggestion::change(
-                    "estimate_delay",
-                    format!("{}: {words}", record.name),
-                    vec![format!("experiments.{i}.{change}")],
-                ))
-            }
-            "input_jump" => {
-                let i = place(document, &experiment?)?;
-                let (part, signal) = sampled_input(model, i)?;
-                (signal.interpolation() != Interpolation::Hold).then(|| {
-                    Suggestion::change(
-                        "hold_input",
-                        "hold each value of the input until the next",
-                        vec![format!("experiments.{i}.{part}.interpolation=hold")],
-                    )
-                })
-            }
-            "clock_difference" => Some(Suggestion::untried(
-                "scale_times",
-                format!(
-                    "put input and response of {} on one clock in the file: multiply the times of the response by {}",
-                    experiment?,
-                    significant(1.0 + 0.01 * warning.number("percent")?, 6)
-                ),
-            )),
-            _ => None,
-        }
-    })
-}
-
 /// The sensor with the most significant mean of its residuals.
 fn about_means(document: &ResultDocument) -> Option<Suggestion> {
-    let means = document
-        .fit_warnings()
-        .filter(|w| w.kind == "residual_mean");
-    let size = |w: &Finding| w.number("t").unwrap_or_default().abs();
-    let worst = means.max_by(|a, b| size(a).total_cmp(&size(b)))?;
-    let (channel, experiment) = (worst.said("channel")?, worst.said("experiment")?);
-    let i = place(document, &experiment)?;
+    let means = document.doubts.iter().filter_map(|doubt| match doubt {
+        Doubt::ResidualMean {
+            experiment,
+            channel,
+            t,
+            ..
+        } => Some((t.abs(), channel, experiment)),
+        _ => None,
+    });
+    let (_, channel, experiment) = means.max_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
+    let i = place(document, experiment)?;
     Some(Suggestion::change(
         "estimate_offset",
         format!("{channel} of {experiment}: estimate the offset of the sensor"),
         vec![format!("experiments.{i}.sensors.{channel}.offset=estimate")],
-    ))
-}
-
-/// The most significant missing term of an equation of motion.
-fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
-    let missing = document.fit_warning("missing_term")?;
-    let term = CoefficientKind::deserialize(missing.quantities.get("term")?).ok()?;
-    let start = written(missing.number("value")?);
-    let width = missing
-        .number("width")
-        .map(|width| format!(", width: {}", written(width)));
-    Some(Suggestion::change(
-        "add_term",
-        "add the missing term",
-        vec![format!(
-            "functions.{}={{basis: constant, start: {start}{}}}",
-            term.name(),
-            width.unwrap_or_default()
-        )],
-    ))
-}
-
-/// A better width of Coulomb friction: the shift of the estimates is at most proportional to it.
-fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
-    let depends = document.fit_warning("friction_width")?;
-    let number = |name: &str| depends.number(name);
-    let (width, better) = (number("width")?, number("better")?);
-    let least = width * WIDTH_SHIFT / number("errors")?;
-    let (kind, words, to) = match better > width {
-        true => (
-            "widen_friction",
-            "a larger width of Coulomb friction fits better",
-            better,
-        ),
-        false => (
-            "narrow_friction",
-            "the estimates depend on the width of Coulomb friction: reduce it",
-            better.max(least.min(0.5 * width)),
-        ),
-    };
-    let to = written(to);
-    Some(Suggestion::change(
-        kind,
-        words,
-        vec![format!("functions.coulomb_friction.width={to}")],
-    ))
-}
-
-/// Noise of the sensor of an input, with cubics where lines connect its samples, as these lose a share of it.
-fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
-    let disturbed = document.fit_warning("disturbed_input")?;
-    let is_held = |signal: &Signal| signal.interpolation() == Interpolation::Hold;
-    if let Some(jump) = document.fit_warning("input_jump") {
-        let i = place(document, &jump.said("experiment")?)?;
-        // The jump explains the disturbance.
-        is_held(sampled_input(model, i)?.1).then_some(())?;
-    }
-    let i = place(document, &disturbed.said("experiment")?)?;
-    let (name, sigma) = (disturbed.said("input")?, disturbed.number("sigma")?);
-    let (part, signal) = sampled_input(model, i)?;
-    let is_linear = signal.interpolation() == Interpolation::Linear;
-    let cubics = is_linear.then(|| format!("experiments.{i}.{part}.interpolation=cubic"));
-    let noise = format!(
-        "experiments.{i}.sigma.{name}={{value: {}, kind: sensor}}",
-        written(sigma)
-    );
-    Some(Suggestion::change(
-        "input_noise",
-        format!("state the noise of the {} sensor", name.replace('_', " ")),
-        std::iter::once(noise).chain(cubics).collect(),
-    ))
-}
-
-/// Cubic interpolation of a force, which loses less.
-fn about_interpolation(document: &ResultDocument) -> Option<Suggestion> {
-    let loss = document.fit_warning("interpolation_loss")?;
-    let input = match loss.said("input")?.as_str() {
-        "force" => "force",
-        _ => "base",
-    };
-    let i = place(document, &loss.said("experiment")?)?;
-    Some(Suggestion::change(
-        "cubic_interpolation",
-        "interpolate the input by cubics",
-        vec![format!("experiments.{i}.{input}.interpolation=cubic")],
     ))
 }
 
@@ -514,11 +341,9 @@ pub(super) fn percent(share: f64, digits: usize) -> String {
 
 /// True where the fit leaves residuals that no noise explains.
 pub(super) fn is_unexplained(document: &ResultDocument) -> bool {
-    let kinds = ["poor_fit", "coloured"];
-    kinds
-        .iter()
-        .any(|kind| document.fit_warning(kind).is_some())
-        && document.worst_fit().is_some_and(|worst| worst < EXACT)
+    has(document, |doubt| {
+        matches!(doubt, Doubt::PoorFit { .. } | Doubt::Coloured { .. })
+    }) && document.worst_fit().is_some_and(|worst| worst < EXACT)
 }
 
 /// True for a fit below [`POOR`].

@@ -4,7 +4,7 @@ use super::{Suggestion, is_poor, of_channel, percent};
 use crate::config::Model;
 use crate::number_format::{significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
-use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
+use kmcfit_core::internals::assessment::{BEYOND_SIGMA, Doubt, EXACT, POOR, ResidualPattern};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::solvers::StartStrategy;
 
@@ -31,8 +31,10 @@ pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
         return Some(of_pattern(document, channel, &pattern));
     }
     let fit = document.worst_fit().unwrap_or(100.0);
-    let beyond = document.fit_warning("beyond_sigma")?;
-    let times = beyond.number("times")?;
+    let times = document.doubts.iter().find_map(|doubt| match doubt {
+        Doubt::BeyondSigma { times } => Some(*times),
+        _ => None,
+    })?;
     let estimated = document.experiments.iter().enumerate().flat_map(|(i, e)| {
         (e.channels.iter()).map(move |c| format!("experiments.{i}.sigma.{}=estimate", c.kind))
     });
@@ -126,10 +128,8 @@ fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPatter
 pub(super) fn about_misfit(document: &ResultDocument, model: &Model) -> Vec<Suggestion> {
     let records = document.experiments.iter().enumerate();
     let mut named = records.flat_map(|(i, e)| e.channels.iter().map(move |c| (i, e, c)));
-    let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
     // No change of a model with one mode explains two.
-    let mut reasons = reasons.filter(|reason| reason.kind == "second_mode");
-    if reasons.next().is_some() {
+    if document.has_two_modes() {
         return Vec::new();
     }
     let Some((i, record, channel)) = named.find(|(_, _, c)| is_poor(c.fit_percent)) else {
