@@ -5,9 +5,7 @@ use crate::source::RawModel;
 use kmcfit::config::ModelFile;
 use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
-use kmcfit::report::{
-    CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json,
-};
+use kmcfit::report::{CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json};
 use kmcfit::results::OutputFolder;
 use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
 use pyo3::exceptions::PyKeyboardInterrupt;

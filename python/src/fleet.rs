@@ -2,7 +2,9 @@
 
 use crate::errors::{Failure, guarded, keyed};
 use kmcfit::config::{ModelFile, Override};
-use kmcfit::fleet::{FleetFolder, Record, RecordList, Row, Trend, check_model, finish, fit_record};
+use kmcfit::fleet::{
+    FleetFolder, FleetRecord, RecordList, Row, Trend, check_model, finish, fit_record,
+};
 use kmcfit_core::internals::threads::sharing;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -78,14 +80,14 @@ impl RawFleet {
 }
 
 /// A record of Rust; errors are those of its changed keys.
-fn given(record: Given) -> Result<Record, kmcfit::error::InputError> {
+fn given(record: Given) -> Result<FleetRecord, kmcfit::error::InputError> {
     let (name, path, content, overrides, columns) = record;
-    Ok(Record {
+    Ok(FleetRecord {
         path,
         content: content.map(|content| Arc::from(&*content)),
         overrides: Override::parse_all(&overrides)?,
         columns,
-        ..Record::of_file(&name)
+        ..FleetRecord::of_file(&name)
     })
 }
 

@@ -33,7 +33,9 @@ mod _kmcfit {
     #[pymodule_export]
     use crate::problem::Problem;
     #[pymodule_export]
-    use crate::runs::{compare, open_run, parse, quantity, read_table, read_text, scaffold, simulate};
+    use crate::runs::{
+        compare, open_run, parse, quantity, read_table, read_text, scaffold, simulate,
+    };
     #[pymodule_export]
     use crate::source::RawModel;
     #[pymodule_export]

@@ -47,7 +47,8 @@ pub fn scaffold(py: Python<'_>, paths: Vec<PathBuf>) -> PyResult<String> {
 #[pyfunction]
 pub fn quantity(name: &str, unit: &str) -> Option<&'static str> {
     let by_name = quantity_of(name);
-    let of = |kind: &Quantity| Unit::recognise(*kind, unit).is_some_and(|unit| !unit.is_arbitrary());
+    let of =
+        |kind: &Quantity| Unit::recognise(*kind, unit).is_some_and(|unit| !unit.is_arbitrary());
     let by_unit = Quantity::ALL.into_iter().find(of);
     let found = match unit.trim() {
         "" => by_name,
@@ -143,7 +144,10 @@ fn free(run: &Run, state: State, kinds: &[ChannelKind]) -> Result<String, Failur
         .map_err(|breakdown| Failure::Numerical(format!("no response: {breakdown}")))?;
     let mut table = CsvTable::new().column("t_s", run.system.grid.times());
     for predicted in responses {
-        table = table.column("displacement_m", predicted.response.displacement(0).to_vec());
+        table = table.column(
+            "displacement_m",
+            predicted.response.displacement(0).to_vec(),
+        );
     }
     Ok(table.to_csv())
 }

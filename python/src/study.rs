@@ -35,11 +35,9 @@ pub fn study(
         };
         let finished = StudiedFit::of(&fit.done.model, &fit.done.fit);
         let finished = Some((finished, fit.done.model.problem.clone()));
-        studied(file, &overrides, &folder, threads, finished, flag).map_err(|error| {
-            match error {
-                Failure::Input(error) => Failure::Input(located(error)),
-                other => other,
-            }
+        studied(file, &overrides, &folder, threads, finished, flag).map_err(|error| match error {
+            Failure::Input(error) => Failure::Input(located(error)),
+            other => other,
         })
     })
 }

@@ -4,7 +4,7 @@ use super::ModelFile;
 use super::alternatives::ScalarOr;
 use super::lowering::sensor_of;
 use super::scaffold::Role;
-use super::spec::{ColumnRef, DelayValue, EstimateValue, ExperimentSpec, SensorSpec};
+use super::spec::{ColumnRef, DelayValue, EstimateValue, ExperimentSpec, SensorKeys};
 use super::values::{ColumnId, NumberOrEstimate, Text};
 use crate::tables::{ColumnName, Table};
 use crate::units::ScaledUnit;
@@ -151,7 +151,7 @@ impl RunSettings {
         let given = spec.and_then(|spec| sensor_of(spec, kind));
         let name = |part: &str| format!("{part} of the {} of {}", kind.name(), self.name);
         let value =
-            |pick: &dyn Fn(&SensorSpec) -> Option<&EstimateValue>, part: &str, default| match given
+            |pick: &dyn Fn(&SensorKeys) -> Option<&EstimateValue>, part: &str, default| match given
                 .and_then(pick)
             {
                 None => SensorValue::Known(default),

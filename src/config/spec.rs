@@ -19,15 +19,15 @@ use crate::config::map::keys;
 
 use super::alternatives::OneOrList;
 use super::choice::choice;
-pub use super::values::{ColumnSpec, WeightRule};
-use super::values::{Count, Format, Nodes, Number, NumberOrColumn, Text};
+pub use super::values::{ColumnSpec, WeightRuleName};
+use super::values::{Count, FormatVersion, Nodes, Number, NumberOrColumn, Text};
 use kmcfit_core::internals::functions::CoefficientKind;
 
 keys! {
     /// A model: records of one system, its coefficient functions, and the settings of the fit.
     pub struct ModelSpec = "model", expecting "a map with the keys format, experiments, functions, fit, …" {
         /// Version of the file format.
-        format: Format, example "1";
+        format: FormatVersion, example "1";
         /// Title for reports.
         title: Option<Text>, example "A decaying mass", default "file name";
         /// Records of one system on a common time axis, measured or to be simulated.
@@ -216,8 +216,8 @@ keys! {
             example "data",
             default "functions",
             needs "a method other than equation-error";
-        /// Gradient of the cost.
-        gradient: Option<Gradient>,
+        /// GradientName of the cost.
+        gradient: Option<GradientName>,
             example "continuous",
             default "discrete",
             needs "a method other than equation-error; continuous: no `sigma` and a sample at every node";
@@ -272,8 +272,8 @@ choice! {
 }
 
 choice! {
-    /// Gradient of the cost.
-    pub type Gradient = kmcfit_core::internals::objective::GradientKind {
+    /// GradientName of the cost.
+    pub type GradientName = kmcfit_core::internals::objective::GradientKind {
         /// Exact gradient of the discretised cost (discrete adjoint).
         Discrete = "discrete",
         /// Discretised adjoint differential equation (continuous adjoint).

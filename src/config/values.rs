@@ -22,9 +22,9 @@ const UNKNOWN: &str = "unknown";
 
 /// The version of the file format: 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Format;
+pub struct FormatVersion;
 
-impl Value for Format {
+impl Value for FormatVersion {
     const KIND: ValueType = ValueType::Format;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
@@ -163,9 +163,9 @@ impl Value for ColumnId {
 
 /// The word `estimate` in place of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Estimate;
+pub struct EstimateWord;
 
-impl Value for Estimate {
+impl Value for EstimateWord {
     const KIND: ValueType = ValueType::Word(ESTIMATE);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let hint = match scalar {
@@ -189,7 +189,7 @@ pub enum NumberOrEstimate {
 }
 
 impl Value for NumberOrEstimate {
-    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, Estimate::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, EstimateWord::KIND]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let expected = "a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}";
         match scalar {
@@ -214,7 +214,8 @@ pub enum Sigma {
 }
 
 impl Value for Sigma {
-    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, Estimate::KIND, ValueType::Text]);
+    const KIND: ValueType =
+        ValueType::AnyOf(&[ValueType::Number, EstimateWord::KIND, ValueType::Text]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Text(ESTIMATE) => Ok(Self::Estimate),
@@ -282,7 +283,7 @@ impl Value for KnotSpec {
 
 choice! {
     /// Rule that chooses the weight of a penalty from the data.
-    pub enum WeightRule {
+    pub enum WeightRuleName {
         /// Discrepancy principle: the largest weight whose residuals agree with the noise.
         Discrepancy = "discrepancy",
         /// Restricted maximum likelihood of noise and smoothness; each penalty has its own weight.
@@ -301,19 +302,19 @@ pub enum Weight {
     /// Given.
     Number(Number),
     /// Chosen from the data by a rule.
-    Rule(WeightRule),
+    Rule(WeightRuleName),
 }
 
 impl Value for Weight {
-    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, WeightRule::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, WeightRuleName::KIND]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let weight = match scalar {
             Scalar::Text(word) if number_in(word).is_none() => {
-                choose(scalar, WeightRule::ALL).map(Self::Rule)
+                choose(scalar, WeightRuleName::ALL).map(Self::Rule)
             }
             other => Number::scalar(other).map(Self::Number),
         };
-        let rules = one_of(WeightRule::NAMES.iter().map(|(name, _)| *name));
+        let rules = one_of(WeightRuleName::NAMES.iter().map(|(name, _)| *name));
         weight.map_err(|m| m.expecting(|_| format!("a finite number, or {rules}")))
     }
 }

@@ -1,6 +1,6 @@
 //! The fit of one record of a fleet.
 
-use super::records::Record;
+use super::records::FleetRecord;
 use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::digest;
 use crate::error::InputError;
@@ -72,7 +72,7 @@ pub fn check_model(file: ModelFile) -> Result<ModelFile, InputError> {
 ///
 /// # Errors
 /// If the file cannot be read.
-pub fn content_of(record: &Record) -> Result<(Arc<[u8]>, String), InputError> {
+pub fn content_of(record: &FleetRecord) -> Result<(Arc<[u8]>, String), InputError> {
     let content: Arc<[u8]> = match &record.content {
         Some(content) => Arc::clone(content),
         None => read_bytes(&record.path, "a record", LONGEST_TABLE)?.into(),
@@ -90,7 +90,11 @@ pub fn content_of(record: &Record) -> Result<(Arc<[u8]>, String), InputError> {
 }
 
 /// Fits a record; `None` where `interrupt` ended it. Every failure, a panic included, is the error of the row.
-pub fn fit_record(model: &ModelFile, record: &Record, interrupt: &Arc<AtomicBool>) -> Option<Row> {
+pub fn fit_record(
+    model: &ModelFile,
+    record: &FleetRecord,
+    interrupt: &Arc<AtomicBool>,
+) -> Option<Row> {
     let clock = Instant::now();
     let found = content_of(record).map(|(content, sha256)| {
         // The fit shares no state with others that a panic could leave half changed.
@@ -114,7 +118,7 @@ pub fn fit_record(model: &ModelFile, record: &Record, interrupt: &Arc<AtomicBool
 /// The row of a record without digest and time; `None` where the fit was interrupted.
 fn fitted(
     fleet: &ModelFile,
-    record: &Record,
+    record: &FleetRecord,
     content: Arc<[u8]>,
     interrupt: &Arc<AtomicBool>,
 ) -> Result<Option<Row>, String> {

@@ -1,7 +1,7 @@
 //! The folder of a fleet: its model, and the rows so far.
 
 use super::fit::{Row, content_of};
-use super::records::Record;
+use super::records::FleetRecord;
 use crate::config::ModelFile;
 use crate::digest::digest;
 use crate::error::InputError;
@@ -104,7 +104,7 @@ impl FleetFolder {
     ///
     /// # Errors
     /// Names the record.
-    pub fn check_record(&self, record: &Record) -> Result<(), InputError> {
+    pub fn check_record(&self, record: &FleetRecord) -> Result<(), InputError> {
         // A record that could not be read has no digest, and may be there now.
         let row = self.row(&record.name).filter(|row| row.error.is_none());
         let is_same =

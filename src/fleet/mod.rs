@@ -13,7 +13,7 @@ mod trend;
 
 pub use fit::{Row, check_model, fit_record};
 pub use folder::FleetFolder;
-pub use records::{Record, RecordList};
+pub use records::{FleetRecord, RecordList};
 pub use report::finish;
 pub use run::run;
 

@@ -16,7 +16,7 @@ const LONGEST: u64 = 1 << 32;
 
 /// A record of a fleet.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Record {
+pub struct FleetRecord {
     /// Name: the path as given.
     pub name: String,
     /// The file; with a content a name whose ending states its format.
@@ -29,7 +29,7 @@ pub struct Record {
     pub columns: Vec<String>,
 }
 
-impl Record {
+impl FleetRecord {
     /// A record without a table.
     pub fn of_file(name: &str) -> Self {
         Self {
@@ -46,7 +46,7 @@ impl Record {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecordList {
     /// Records.
-    pub records: Vec<Record>,
+    pub records: Vec<FleetRecord>,
     /// Names of the other columns of the table.
     pub columns: Vec<String>,
 }
@@ -73,7 +73,7 @@ impl RecordList {
             match argument.contains(['*', '?', '[']) && !path.exists() {
                 true => list.records.extend(matches(argument)?),
                 // A file that does not exist is an error of its row.
-                false => list.records.push(Record::of_file(argument)),
+                false => list.records.push(FleetRecord::of_file(argument)),
             }
         }
         list.checked()
@@ -166,8 +166,8 @@ fn record(
     table: &Path,
     headings: &csv::StringRecord,
     row: &csv::StringRecord,
-) -> Result<Record, InputError> {
-    let mut record = Record::of_file("");
+) -> Result<FleetRecord, InputError> {
+    let mut record = FleetRecord::of_file("");
     for (heading, cell) in headings.iter().zip(row) {
         let number = || {
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
@@ -204,12 +204,12 @@ fn record(
 }
 
 /// The files of a pattern, in the order of their names.
-fn matches(pattern: &str) -> Result<Vec<Record>, InputError> {
+fn matches(pattern: &str) -> Result<Vec<FleetRecord>, InputError> {
     let paths = glob::glob(pattern).into_iter().flatten();
     // A pattern finds names in UTF-8 only.
     let files = paths.filter_map(Result::ok).filter(|path| path.is_file());
-    let records: Vec<Record> = files
-        .filter_map(|path| Some(Record::of_file(path.to_str()?)))
+    let records: Vec<FleetRecord> = files
+        .filter_map(|path| Some(FleetRecord::of_file(path.to_str()?)))
         .collect();
     match records.is_empty() {
         true => Err(

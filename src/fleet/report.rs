@@ -21,7 +21,7 @@ struct Collected<'a> {
     distributions: Vec<Distribution>,
     /// Records with the verdicts Adequate, Check and Inadequate.
     verdicts: [usize; 3],
-    /// Record and reason.
+    /// FleetRecord and reason.
     errors: Vec<[String; 2]>,
 }
 
@@ -194,7 +194,7 @@ impl<'a> Collected<'a> {
         let marked: Vec<Vec<String>> = marked.map(Vec::from).collect();
         let table = shell::table(
             "Records",
-            &["Record", "Error or estimate that stands out"],
+            &["FleetRecord", "Error or estimate that stands out"],
             &marked,
         );
         let sections: Vec<shell::Section> = vec![

@@ -2,7 +2,7 @@
 
 use super::fit::fit_record;
 use super::folder::FleetFolder;
-use super::records::{Record, RecordList};
+use super::records::{FleetRecord, RecordList};
 use crate::config::ModelFile;
 use crate::error::InputError;
 use kmcfit_core::internals::threads::{map, sharing};
@@ -22,12 +22,12 @@ pub fn run(
     interrupt: &Arc<AtomicBool>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<bool, InputError> {
-    let is_open = |record: &&&Record| {
+    let is_open = |record: &&&FleetRecord| {
         folder
             .row(&record.name)
             .is_none_or(|row| row.error.is_some())
     };
-    let todo: Vec<&Record> = list.records.iter().filter(|r| is_open(&r)).collect();
+    let todo: Vec<&FleetRecord> = list.records.iter().filter(|r| is_open(&r)).collect();
     let before = list.records.len() - todo.len();
     let shared = Mutex::new((folder, 0, None));
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
 use super::names::{factor_of_time, letters};
-use super::{Channel, Sampling, last_part};
+use super::{FileChannel, Sampling, last_part};
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::units::Quantity;
@@ -14,7 +14,7 @@ const ALIGNED: f64 = 1e-5;
 /// Deviation from equal spacing, in steps, of times that are those of a rate.
 const EVEN: f64 = 0.01;
 
-fn is_time(channel: &Channel) -> bool {
+fn is_time(channel: &FileChannel) -> bool {
     channel.values.windows(2).all(|pair| pair[1] > pair[0])
         && quantity_of(last_part(&channel.name)) == Some(Quantity::Time)
 }
@@ -33,13 +33,13 @@ pub(super) fn sampling_of(times: &[f64], unit: &str) -> Option<Sampling> {
 }
 
 /// Lengths of the channels whose times are another channel.
-pub(super) fn timed(channels: &[Channel]) -> BTreeSet<usize> {
+pub(super) fn timed(channels: &[FileChannel]) -> BTreeSet<usize> {
     let timers = channels.iter().filter(|c| c.values.len() > 1 && is_time(c));
     timers.map(|c| c.values.len()).collect()
 }
 
 /// The times of a channel among others of its length: with its name in theirs, else in the nearest group.
-fn timer_of(own: &Channel, channels: &[Channel], timers: &[usize]) -> Option<usize> {
+fn timer_of(own: &FileChannel, channels: &[FileChannel], timers: &[usize]) -> Option<usize> {
     let name = letters(last_part(&own.name));
     let nearness = |timer: &&usize| {
         let times = &channels[**timer].name;
@@ -60,7 +60,7 @@ fn timer_of(own: &Channel, channels: &[Channel], timers: &[usize]) -> Option<usi
 
 /// Gives channels the rate of their own times, `t_acc` or `time` in their group, where those of channels of other quantities differ. Returns
 /// the number of these channels.
-pub(crate) fn own_times(channels: &mut [Channel]) -> usize {
+pub(crate) fn own_times(channels: &mut [FileChannel]) -> usize {
     let is_timer = |i: &usize| {
         let own = &channels[*i];
         own.values.len() > 2 && own.sampling.is_none() && is_time(own)
@@ -121,7 +121,7 @@ pub(crate) fn own_times(channels: &mut [Channel]) -> usize {
 
 /// Takes the difference of the first times of channels into account; where the times stand in the file, it is named.
 pub(super) fn begin_at(
-    channels: &mut [Channel],
+    channels: &mut [FileChannel],
     begins: &[Option<(f64, String)>],
     timed: &BTreeSet<usize>,
 ) {
@@ -144,8 +144,8 @@ pub(super) fn begin_at(
 }
 
 /// Common part of channels with the same step: they are cut to it, and each keeps the rest of a step by which it is later. Returns a note.
-pub(crate) fn align(channels: &mut [Channel]) -> Option<String> {
-    let axis = |channel: &Channel| match channel.sampling {
+pub(crate) fn align(channels: &mut [FileChannel]) -> Option<String> {
+    let axis = |channel: &FileChannel| match channel.sampling {
         Some(Sampling::Interval { start, step }) => Some((start, step, channel.values.len())),
         _ => None,
     };
@@ -195,12 +195,12 @@ pub(crate) fn align(channels: &mut [Channel]) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn channel(name: &str, start: Option<f64>, values: &[f64]) -> Channel {
-        Channel {
+    fn channel(name: &str, start: Option<f64>, values: &[f64]) -> FileChannel {
+        FileChannel {
             name: name.to_owned(),
             sampling: start.and_then(|start| Sampling::interval(start, 0.5)),
             values: values.to_vec(),
-            ..Channel::default()
+            ..FileChannel::default()
         }
     }
 

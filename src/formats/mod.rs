@@ -47,7 +47,7 @@ use crate::error::InputError;
 
 /// One variable, array column or channel of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Channel {
+pub struct FileChannel {
     /// Dotted path in the file, as in `test.force`; unique in the file.
     pub name: String,
     /// Unit as spelt in the file, or derived from its type codes.
@@ -81,7 +81,7 @@ pub struct Unusable {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Channels {
     /// Usable channels, in the order of the file.
-    pub channels: Vec<Channel>,
+    pub channels: Vec<FileChannel>,
     /// All others.
     pub unusable: Vec<Unusable>,
     /// Treatment of the samples, a clause each.
@@ -98,12 +98,12 @@ impl Channels {
         sampling: Option<Sampling>,
         values: Vec<f64>,
     ) {
-        self.channels.push(Channel {
+        self.channels.push(FileChannel {
             name: name.to_owned(),
             unit: unit.filter(|unit| !unit.trim().is_empty()),
             sampling,
             values,
-            ..Channel::default()
+            ..FileChannel::default()
         });
     }
 
@@ -144,7 +144,7 @@ pub fn read(path: &Path, bytes: &[u8], format: Format) -> Result<Channels, Input
 }
 
 /// Makes names unique: the second `force` becomes `force.2`.
-fn rename_repeated(channels: &mut [Channel]) {
+fn rename_repeated(channels: &mut [FileChannel]) {
     let mut counts = BTreeMap::<String, usize>::new();
     let mut taken: std::collections::BTreeSet<String> =
         channels.iter().map(|c| c.name.clone()).collect();

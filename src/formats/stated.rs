@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::names::{Meaning, Name, factor_of_rate, factor_of_time, is_generic, letters, read};
-use super::{Channel, Channels, Sampling, clocks, last_part};
+use super::{Channels, FileChannel, Sampling, clocks, last_part};
 use crate::clock::Clock;
 use crate::headings::split_unit;
 use crate::quantity_names::quantity_of;
@@ -329,7 +329,7 @@ impl Channels {
         }
         clocks::begin_at(&mut self.channels, &begins, &timed);
         // Times in the file take precedence over a rate.
-        let is_timed = |c: &&mut Channel| timed.contains(&c.values.len());
+        let is_timed = |c: &&mut FileChannel| timed.contains(&c.values.len());
         for channel in self.channels.iter_mut().filter(is_timed) {
             channel.stated_step = channel.sampling.take().map(Sampling::step);
         }
@@ -344,7 +344,7 @@ impl Channels {
         timed: &BTreeSet<usize>,
         begins: &mut [Option<(f64, String)>],
     ) -> BTreeSet<String> {
-        let has_samples = |c: &&Channel| c.values.len() > 1;
+        let has_samples = |c: &&FileChannel| c.values.len() > 1;
         let names = self.channels.iter().filter(has_samples);
         let all = names.map(|c| letters(last_part(&c.name))).collect();
         let mut columns = BTreeMap::<String, usize>::new();
@@ -403,7 +403,7 @@ impl Channels {
     fn state_variables(&mut self) {
         let longest = self.channels.iter().map(|c| c.values.len()).max();
         let longest = longest.unwrap_or(0).max(8);
-        let is_small = |c: &&Channel| c.values.len() <= SMALL && 4 * c.values.len() < longest;
+        let is_small = |c: &&FileChannel| c.values.len() <= SMALL && 4 * c.values.len() < longest;
         let is_meant = |path: &str| {
             let (group, name) = path.rsplit_once('.').unwrap_or(("", path));
             read(name).is_some() || read(last_part(group)).is_some()

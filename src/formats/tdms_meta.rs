@@ -255,7 +255,10 @@ mod tests {
     #[test]
     fn paths_are_dotted() {
         for (path, expected) in [
-            ("/'Group'/'Channel 1'", Some(("Group.Channel 1", true))),
+            (
+                "/'Group'/'FileChannel 1'",
+                Some(("Group.FileChannel 1", true)),
+            ),
             ("/'it''s'/'a/b'", Some(("it's.a/b", true))),
             ("/'Group'", Some(("Group", false))),
             ("/", Some(("", false))),

@@ -299,7 +299,7 @@ fn add(
             times.extend(pair.first());
             values.extend(pair.last());
         }
-        let is_there = |c: &super::Channel| c.name.starts_with("time") && c.values == times;
+        let is_there = |c: &super::FileChannel| c.name.starts_with("time") && c.values == times;
         if !channels.channels.iter().any(is_there) {
             let unit = Some(header.time_unit).filter(|unit| !unit.is_empty());
             channels.push("time", unit.or(Some("s".into())), None, times);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::origin::{ChannelFile, ChannelOrigin, ColumnValues, Origin};
 use super::{ColumnName, Table, TableFormat, field};
 use crate::error::{InputError, Location};
-use crate::formats::{self, Channel, Channels, Format, Sampling, Unusable, last_part};
+use crate::formats::{self, Channels, FileChannel, Format, Sampling, Unusable, last_part};
 use crate::memory;
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
@@ -51,7 +51,7 @@ impl Table {
             unusable,
             notes,
         };
-        let mut members: Vec<Vec<(usize, Channel)>> = Vec::new();
+        let mut members: Vec<Vec<(usize, FileChannel)>> = Vec::new();
         for (i, channel) in channels.into_iter().enumerate() {
             let length = channel.values.len();
             let key = (length, channel.sampling.map(Sampling::key));
@@ -76,7 +76,7 @@ impl Table {
         path: &Path,
         file: &Arc<ChannelFile>,
         set: usize,
-        members: Vec<(usize, Channel)>,
+        members: Vec<(usize, FileChannel)>,
     ) -> Result<Self, InputError> {
         let (rows, sampling) = file.sets.get(set).copied().unwrap_or_default();
         let numbers = rows.saturating_mul(members.len() + NUMBERS_PER_SAMPLE);
@@ -96,11 +96,11 @@ impl Table {
         if let Some(sampling) = sampling {
             let is_taken = |name: &&&str| table.headers.iter().any(|header| header == **name);
             let name = TIME.iter().find(|name| !is_taken(name)).unwrap_or(&TIME[1]);
-            table.push_channel(Channel {
+            table.push_channel(FileChannel {
                 name: (*name).to_owned(),
                 unit: Some("s".to_owned()),
                 values: (0..rows).map(|i| sampling.time(i)).collect(),
-                ..Channel::default()
+                ..FileChannel::default()
             });
             if let Origin::Channels(origin) = &mut table.origin {
                 origin.numbers.push(0);
@@ -110,7 +110,7 @@ impl Table {
         Ok(table)
     }
 
-    fn push_channel(&mut self, channel: Channel) {
+    fn push_channel(&mut self, channel: FileChannel) {
         let place = |row: usize| Location::Sample {
             file: self.path.clone(),
             sample: row + 1,

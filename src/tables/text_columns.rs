@@ -3,7 +3,7 @@
 use super::Table;
 use super::detect::DELIMITERS;
 use super::origin::ColumnValues;
-use crate::formats::{Channel, align, own_times};
+use crate::formats::{FileChannel, align, own_times};
 use crate::headings::split_unit;
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
@@ -219,11 +219,11 @@ impl Table {
             }
             let stated = self.stated_unit(i);
             let name = split_unit(self.quantity_name(i)).0.replace('.', " ");
-            channels.push(Channel {
+            channels.push(FileChannel {
                 name: format!("{block}.{name}"),
                 unit: stated.text().map(str::to_owned).filter(|_| is_timer),
                 values: samples.iter().take(rows).copied().collect(),
-                ..Channel::default()
+                ..FileChannel::default()
             });
         }
         if own_times(&mut channels) == 0 {

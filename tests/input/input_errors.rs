@@ -2,7 +2,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit_core::internals::record::InputErrorKind;
+use kmcfit_core::internals::record::InputNoiseKind;
 use kmcfit_core::internals::system::InputQuantity;
 
 /// A forced record of 41 samples over 4 s; line 5 has the sigmas, line 7 a further key.
@@ -57,8 +57,8 @@ fn message(text: &str) -> String {
 #[test]
 fn the_sigma_of_an_input_is_that_of_its_samples() {
     for (word, kind) in [
-        ("sensor", InputErrorKind::Sensor),
-        ("drive", InputErrorKind::Drive),
+        ("sensor", InputNoiseKind::Sensor),
+        ("drive", InputNoiseKind::Drive),
     ] {
         let model =
             read(&FORCED.replace("sensor", word)).unwrap_or_else(|message| panic!("{message}"));

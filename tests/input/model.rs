@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use kmcfit::config::ModelFile;
 use kmcfit::config::alternatives::ScalarOr;
 use kmcfit::config::spec::{
-    Basis, ByCoefficient, FitMethod, FunctionSpec, Gradient, InitialSpec, PenaltyKind, PenaltySpec,
-    Shared, StepMethod, WeightRule,
+    BasisName, ByCoefficient, FitMethod, FunctionSpec, GradientName, InitialSpec, PenaltyKeys,
+    PenaltyKind, Shared, StepMethod, WeightRuleName,
 };
 use kmcfit::config::values::{
     Bound, ColumnId, Count, KnotSpec, KnownValue, Nodes, Number, NumberOrColumn, NumberOrEstimate,
@@ -88,7 +88,7 @@ fn every_key_is_read() {
     let functions = spec.functions;
     assert_eq!(
         of(&functions, CoefficientKind::MASS).basis,
-        Some(Basis::Nodal)
+        Some(BasisName::Nodal)
     );
     assert_eq!(
         of(&functions, CoefficientKind::MASS).start,
@@ -108,7 +108,7 @@ fn every_key_is_read() {
 
     let fit = spec.fit.unwrap();
     assert_eq!(fit.method, Some(FitMethod::Lbfgs));
-    assert_eq!(fit.gradient, Some(Gradient::Continuous));
+    assert_eq!(fit.gradient, Some(GradientName::Continuous));
     assert_eq!(fit.memory.map(|n| n.0), Some(10));
     let stop = fit.stop.unwrap();
     assert_eq!(stop.iterations, Some(Count(1000)));
@@ -145,7 +145,7 @@ fn shapes_limits_and_penalties_are_read() {
     let functions = ModelFile::parse("m.yaml", text).unwrap().spec.functions;
 
     let mass = of(&functions, CoefficientKind::MASS);
-    assert_eq!(mass.basis, Some(Basis::PiecewiseLinear));
+    assert_eq!(mass.basis, Some(BasisName::PiecewiseLinear));
     assert_eq!(mass.knots, Some(KnotSpec::Count(Count(11))));
     let list = vec![Number(1.0), Number(2.5)];
     assert_eq!(mass.start, Some(StartSpec::List(list)));
@@ -157,18 +157,18 @@ fn shapes_limits_and_penalties_are_read() {
     assert_eq!((&*max.data, &*max.column), ("m.csv", "m"));
 
     let damping = of(&functions, CoefficientKind::DAMPING);
-    assert_eq!(damping.basis, Some(Basis::BSpline));
+    assert_eq!(damping.basis, Some(BasisName::BSpline));
     let times = [0.0, 1.5, 3.0].map(Number).to_vec();
     assert_eq!(damping.knots, Some(KnotSpec::Times(times)));
-    let tikhonov = |order, weight, reference| PenaltySpec {
+    let tikhonov = |order, weight, reference| PenaltyKeys {
         kind: PenaltyKind::Tikhonov,
         order: Some(Count(order)),
         weight,
         reference,
     };
     let two: Vec<_> = damping.penalty.iter().flat_map(|s| s.iter()).collect();
-    let slope = tikhonov(1, Weight::Rule(WeightRule::Discrepancy), None);
-    let variation = PenaltySpec {
+    let slope = tikhonov(1, Weight::Rule(WeightRuleName::Discrepancy), None);
+    let variation = PenaltyKeys {
         kind: PenaltyKind::TotalVariation,
         order: None,
         weight: Weight::Number(Number(2.0)),
@@ -182,7 +182,7 @@ fn shapes_limits_and_penalties_are_read() {
     let many: Vec<_> = stiffness.penalty.iter().flat_map(|s| s.iter()).collect();
     let reference = NumberOrColumn::Number(Number(1.0));
     let value = tikhonov(0, Weight::Number(Number(1e-3)), Some(reference));
-    let curvature = tikhonov(2, Weight::Rule(WeightRule::RestrictedLikelihood), None);
+    let curvature = tikhonov(2, Weight::Rule(WeightRuleName::RestrictedLikelihood), None);
     let expected = [("[0]".to_owned(), &value), ("[1]".to_owned(), &curvature)];
     assert_eq!(many, expected);
 }

@@ -1,12 +1,12 @@
 //! Valid files that loggers and their libraries write: each of `tests/formats/storage/` holds the record of `right.csv`.
 
-use kmcfit::formats::{Channel, read, recognise};
+use kmcfit::formats::{FileChannel, read, recognise};
 use std::fs;
 use std::path::Path;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/formats/storage");
 
-fn channels(file: &str) -> Vec<Channel> {
+fn channels(file: &str) -> Vec<FileChannel> {
     let path = Path::new(FOLDER).join(file);
     let bytes = fs::read(&path).expect("a file");
     let format = recognise(&path, &bytes).unwrap_or_else(|error| panic!("{error}"));

@@ -16,7 +16,7 @@ pub mod assessment {
 pub mod builder {
     pub use crate::builder::{
         BasisSpec, BuildError, BuildNotice, Builder, ChannelSpec, CoefficientSpec, Contradiction,
-        Knots, PenaltySpec, PenaltyWeight, Record, ScalarSpec, SensorSpec, Start, WeightSearch,
+        Knots, PenaltyWeight, Record, Roughness, ScalarSpec, SensorSpec, Start, WeightSearch,
         listed,
     };
 }
@@ -68,7 +68,7 @@ pub mod number_format {
 }
 pub mod record {
     pub use crate::record::{
-        BaseMotion, Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, Loss,
+        BaseMotion, Channel, ChannelKind, Experiment, Input, InputNoise, InputNoiseKind, Loss,
         NoiseEstimate, NoiseModel, ScoreCovariance, Sensor, Waveform, Weighting, integral_over,
     };
 }

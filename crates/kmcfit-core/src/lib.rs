@@ -92,7 +92,7 @@ pub use builder::{
 pub use constraints::{Constraint, Shape, TimeHistory};
 pub use functions::{CoefficientKind, Prior, WeightRule};
 pub use problem::{Problem, ProblemError};
-pub use record::{ChannelKind, InputErrorKind, Loss, NoiseModel, Weighting};
+pub use record::{ChannelKind, InputNoiseKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
 pub use system::{
     Excitation, Grid, InputQuantity, Method, NodalCoefficients, StageSamples, State, SupportMotion,

@@ -4,16 +4,14 @@ use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::config::lowering::Place;
 use crate::config::spec::{
-    self as config, Basis, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec, PenaltyKind,
-    WeightRule,
+    self as config, BasisName, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec,
+    PenaltyKind, WeightRuleName,
 };
 use crate::config::values::{
     Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Weight,
 };
 use crate::error::InputError;
-use kmcfit_core::internals::builder::{
-    self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,
-};
+use kmcfit_core::internals::builder::{self, BasisSpec, CoefficientSpec, PenaltyWeight, Roughness};
 use kmcfit_core::internals::constraints::TimeHistory;
 use kmcfit_core::internals::functions::{self, CoefficientKind};
 use kmcfit_core::internals::identifiability::{ScaleSource, scale_source};
@@ -250,11 +248,13 @@ pub(super) fn check_unknown_mass(file: &ModelFile, problem: &Problem) -> Result<
 }
 
 /// The additional key of a basis.
-fn own_key(kind: Basis) -> Option<&'static str> {
+fn own_key(kind: BasisName) -> Option<&'static str> {
     match kind {
-        Basis::Nodal | Basis::Constant => None,
-        Basis::Polynomial => Some("degree"),
-        Basis::PiecewiseConstant | Basis::PiecewiseLinear | Basis::BSpline => Some("knots"),
+        BasisName::Nodal | BasisName::Constant => None,
+        BasisName::Polynomial => Some("degree"),
+        BasisName::PiecewiseConstant | BasisName::PiecewiseLinear | BasisName::BSpline => {
+            Some("knots")
+        }
     }
 }
 
@@ -286,7 +286,7 @@ fn check_basis_keys(at: &Place<'_>, spec: &FunctionSpec) -> Result<(), InputErro
 }
 
 /// The basis of a function to be fitted.
-fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: Basis) -> Result<BasisSpec, InputError> {
+fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: BasisName) -> Result<BasisSpec, InputError> {
     let missing = |what: &str, expected: &str| {
         at.error(format!("the basis `{kind}` needs {what}"))
             .expected(expected)
@@ -301,12 +301,12 @@ fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: Basis) -> Result<BasisSpec, 
         )),
     };
     Ok(match kind {
-        Basis::Nodal => BasisSpec::Nodal,
-        Basis::Constant => BasisSpec::Constant,
-        Basis::PiecewiseConstant => BasisSpec::PiecewiseConstant(knots()?),
-        Basis::PiecewiseLinear => BasisSpec::PiecewiseLinear(knots()?),
-        Basis::BSpline => BasisSpec::BSpline(knots()?),
-        Basis::Polynomial => {
+        BasisName::Nodal => BasisSpec::Nodal,
+        BasisName::Constant => BasisSpec::Constant,
+        BasisName::PiecewiseConstant => BasisSpec::PiecewiseConstant(knots()?),
+        BasisName::PiecewiseLinear => BasisSpec::PiecewiseLinear(knots()?),
+        BasisName::BSpline => BasisSpec::BSpline(knots()?),
+        BasisName::Polynomial => {
             let Count(degree) = spec.degree.ok_or_else(|| {
                 missing("a degree", "`degree`: an integer, for instance `degree: 1`")
             })?;
@@ -320,19 +320,19 @@ fn numbers(list: &[Number]) -> Vec<f64> {
 }
 
 fn basis_names() -> String {
-    let names: Vec<&str> = Basis::ALL.iter().map(|(name, _)| *name).collect();
+    let names: Vec<&str> = BasisName::ALL.iter().map(|(name, _)| *name).collect();
     names.join(", ")
 }
 
 fn start(
     at: &Place<'_>,
     grid: &Grid,
-    kind: Basis,
+    kind: BasisName,
     given: &StartSpec,
 ) -> Result<builder::Start, InputError> {
     match given {
         StartSpec::Number(value) => Ok(builder::Start::Constant(value.0)),
-        StartSpec::List(_) if kind == Basis::BSpline => Err(at
+        StartSpec::List(_) if kind == BasisName::BSpline => Err(at
             .error("`start` of the basis `b-spline` must be one number")
             .found("a list")
             .expected("a finite number, or a column: {data: file.csv, column: name}")),
@@ -344,8 +344,8 @@ fn start(
 fn penalty(
     at: &Place<'_>,
     grid: &Grid,
-    given: &config::PenaltySpec,
-) -> Result<PenaltySpec, InputError> {
+    given: &config::PenaltyKeys,
+) -> Result<Roughness, InputError> {
     if given.kind == PenaltyKind::TotalVariation {
         return total_variation(at, given);
     }
@@ -357,7 +357,7 @@ fn penalty(
     };
     let reference = given.reference.as_ref();
     let reference = reference.map(|r| history(&at.below("reference"), grid, r));
-    Ok(PenaltySpec::Tikhonov {
+    Ok(Roughness::Tikhonov {
         order,
         weight: penalty_weight(given.weight),
         reference: reference.transpose()?,
@@ -365,7 +365,7 @@ fn penalty(
 }
 
 /// A penalty on total variation; refuses keys other than the weight.
-fn total_variation(at: &Place<'_>, given: &config::PenaltySpec) -> Result<PenaltySpec, InputError> {
+fn total_variation(at: &Place<'_>, given: &config::PenaltyKeys) -> Result<Roughness, InputError> {
     let others = [
         ("order", given.order.is_some()),
         ("reference", given.reference.is_some()),
@@ -377,18 +377,18 @@ fn total_variation(at: &Place<'_>, given: &config::PenaltySpec) -> Result<Penalt
             .expected(format!("no `{other}`, or `kind: tikhonov`")));
     }
     let weight = penalty_weight(given.weight);
-    Ok(PenaltySpec::TotalVariation { weight })
+    Ok(Roughness::TotalVariation { weight })
 }
 
 fn penalty_weight(given: Weight) -> PenaltyWeight {
     let rule = match given {
         Weight::Number(Number(weight)) => return PenaltyWeight::Given(weight),
-        Weight::Rule(WeightRule::Period) => return PenaltyWeight::Period,
-        Weight::Rule(WeightRule::Discrepancy) => functions::WeightRule::Discrepancy,
-        Weight::Rule(WeightRule::RestrictedLikelihood) => {
+        Weight::Rule(WeightRuleName::Period) => return PenaltyWeight::Period,
+        Weight::Rule(WeightRuleName::Discrepancy) => functions::WeightRule::Discrepancy,
+        Weight::Rule(WeightRuleName::RestrictedLikelihood) => {
             functions::WeightRule::RestrictedLikelihood
         }
-        Weight::Rule(WeightRule::Bic) => functions::WeightRule::Bic,
+        Weight::Rule(WeightRuleName::Bic) => functions::WeightRule::Bic,
     };
     PenaltyWeight::Rule(rule)
 }

@@ -9,7 +9,7 @@ use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};
 use super::functions;
 use crate::config::ModelFile;
-use crate::config::spec::{Basis, FitMethod};
+use crate::config::spec::{BasisName, FitMethod};
 use crate::config::values::{Count, KnotSpec, Nodes};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
@@ -106,9 +106,11 @@ fn check_size(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(), Inp
         .map(|(_, spec)| match spec.basis {
             _ if matches!(mode, BuildMode::Simulate { .. }) => 0,
             None => 0,
-            Some(Basis::Constant) => 1,
-            Some(Basis::Polynomial) => spec.degree.map_or(1, |degree| degree.0.saturating_add(1)),
-            Some(Basis::Nodal) => FEW_PARAMETERS,
+            Some(BasisName::Constant) => 1,
+            Some(BasisName::Polynomial) => {
+                spec.degree.map_or(1, |degree| degree.0.saturating_add(1))
+            }
+            Some(BasisName::Nodal) => FEW_PARAMETERS,
             Some(_) => match &spec.knots {
                 Some(KnotSpec::Count(count)) => count.0,
                 Some(KnotSpec::Times(times)) => times.len(),

@@ -6,7 +6,7 @@ use crate::config::map::keys;
 use super::{ByCoefficient, Own, RangeSpec};
 use crate::config::alternatives::{OneOrList, ScalarOr};
 use crate::config::choice::choice;
-use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate};
+use crate::config::values::{ColumnId, Count, EstimateWord, Number, NumberOrEstimate};
 use crate::config::values::{Sigma, Text};
 
 keys! {
@@ -330,11 +330,11 @@ keys! {
     /// Sensor of each channel: sample = gain * response(t - delay) + offset + drift * time; delay of the force or of the base motion.
     pub struct SensorsSpec (Default) = "sensors", expecting "a map such as {acceleration: {offset: estimate}}" {
         /// Sensor of the displacement.
-        displacement: Option<SensorSpec>, example "{drift: estimate}";
+        displacement: Option<SensorKeys>, example "{drift: estimate}";
         /// Sensor of the velocity.
-        velocity: Option<SensorSpec>, example "{gain: estimate}";
+        velocity: Option<SensorKeys>, example "{gain: estimate}";
         /// Sensor of the acceleration.
-        acceleration: Option<SensorSpec>, example "{offset: estimate}";
+        acceleration: Option<SensorKeys>, example "{offset: estimate}";
         /// Sensor of the force.
         force: Option<InputSensorSpec>, example "{delay: estimate}", needs "`columns.force`, no motion of the base";
         /// Sensor of the acceleration of the base.
@@ -369,7 +369,7 @@ keys! {
 
 keys! {
     /// Parameters of a sensor.
-    pub struct SensorSpec (Default) = "sensor", expecting "a map such as {gain: 1.0, offset: estimate}" {
+    pub struct SensorKeys (Default) = "sensor", expecting "a map such as {gain: 1.0, offset: estimate}" {
         /// Gain.
         gain: Option<EstimateValue>,
             example "1.0",
@@ -505,7 +505,7 @@ keys! {
 }
 
 /// Initial state: `estimate`, or displacement and velocity.
-pub type InitialSpec = ScalarOr<Estimate, InitialStateSpec>;
+pub type InitialSpec = ScalarOr<EstimateWord, InitialStateSpec>;
 
 keys! {
     /// Initial state: each component a number, `estimate`, or an estimate with a start value or a prior.

@@ -10,8 +10,8 @@ use crate::config::values::{
 keys! {
     /// A coefficient function: estimated, with a basis and start values, or fixed.
     pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
-        /// Basis of an estimated function, which defines its parameters.
-        basis: Option<Basis>,
+        /// BasisName of an estimated function, which defines its parameters.
+        basis: Option<BasisName>,
             example "piecewise-linear",
             needs "`start`";
         /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times; `auto`: about
@@ -64,7 +64,7 @@ keys! {
             range "at least `min`",
             needs "`basis`; method gauss-newton, projected-gradient or equation-error";
         /// Penalty on the roughness, added to J; or a list of penalties.
-        penalty: Option<OneOrList<PenaltySpec>>,
+        penalty: Option<OneOrList<PenaltyKeys>>,
             example "{kind: tikhonov, order: 2, weight: 0.1}",
             default "none",
             needs "`basis`";
@@ -78,8 +78,8 @@ keys! {
 }
 
 choice! {
-    /// Basis of a coefficient function.
-    pub enum Basis {
+    /// BasisName of a coefficient function.
+    pub enum BasisName {
         /// One parameter per node of the grid.
         Nodal = "nodal",
         /// One constant.
@@ -98,7 +98,7 @@ choice! {
 keys! {
     /// Penalty on the roughness of a function p: `tikhonov`, weight times the integral of the squared derivative, or `tv`,
     /// weight times the total variation, which permits jumps.
-    pub struct PenaltySpec = "penalty", expecting "a map such as {kind: tikhonov, order: 2, weight: 0.1}" {
+    pub struct PenaltyKeys = "penalty", expecting "a map such as {kind: tikhonov, order: 2, weight: 0.1}" {
         /// Measure of roughness.
         kind: PenaltyKind,
             example "tikhonov",

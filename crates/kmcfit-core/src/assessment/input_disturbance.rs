@@ -17,7 +17,7 @@ use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
 use crate::noise::Correlation;
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{Channel, Experiment, InputError, InputErrorKind, Loss, NoiseModel};
+use crate::record::{Channel, Experiment, InputNoise, InputNoiseKind, Loss, NoiseModel};
 use crate::scalar_search::minimum;
 use crate::simd::sum::rms;
 use crate::solvers::input_error_effect;
@@ -69,7 +69,7 @@ fn contradicted(
     experiment: &Experiment,
     channel: &Channel,
     residuals: &[f64],
-    error: &InputError,
+    error: &InputNoise,
 ) -> Option<Doubt> {
     let effect = channel.correlation().and_then(Correlation::input_errors)?;
     let count = residuals.len().min(MOST_SAMPLES);
@@ -108,9 +108,9 @@ fn disturbed(
         && (channel.correlation().is_some() || !is_white(channel, &evaluation.predictions[e][0]));
     let (quantity, signal) = measured(experiment).filter(|_| is_judged)?;
     let size = rms(signal.values());
-    let error = InputError {
+    let error = InputNoise {
         quantity,
-        kind: InputErrorKind::Sensor,
+        kind: InputNoiseKind::Sensor,
         sigma: size,
         times: signal.times().to_vec(),
         interpolation: signal.interpolation(),

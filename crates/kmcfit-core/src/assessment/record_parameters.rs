@@ -12,7 +12,7 @@ use super::refit::without_correlation;
 use crate::functions::{ScalarParameter, ScalarValue};
 use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::record::{Channel, Experiment, InputError, InputErrorKind, Sensor, Weighting};
+use crate::record::{Channel, Experiment, InputNoise, InputNoiseKind, Sensor, Weighting};
 use crate::rows::append;
 use crate::system::{Grid, InputSample};
 use crate::threads::{available, map};
@@ -52,7 +52,7 @@ pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
             found.extend([RecordParameter::Delay(e), RecordParameter::Rate(e)]);
         }
         // With a noisy sensor of the input a part of the prediction is held, which has no derivative in a gain.
-        let holds = |error: &InputError| error.kind == InputErrorKind::Sensor;
+        let holds = |error: &InputNoise| error.kind == InputNoiseKind::Sensor;
         let is_held = experiment.input_error.as_ref().is_some_and(holds);
         if !is_held && (!experiment.is_free() || experiment.channels.len() > 1) {
             let open = experiment.channels.iter().enumerate();

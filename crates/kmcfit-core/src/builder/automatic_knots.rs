@@ -1,7 +1,7 @@
 //! Automatic knots: a spline that is richer than the data need, and a penalty whose weight they choose.
 
 use super::basis::{BasisSpec, Knots};
-use super::coefficient::{CoefficientSpec, PenaltySpec, PenaltyWeight};
+use super::coefficient::{CoefficientSpec, PenaltyWeight, Roughness};
 use super::{BuildError, Builder, Record};
 use crate::functions::WeightRule;
 use crate::problem::FEW_PARAMETERS;
@@ -70,7 +70,7 @@ impl Builder {
             if spec.has_automatic_knots() {
                 spec.set_knots(intervals + 1);
                 if spec.penalties.is_empty() {
-                    spec.penalties.push(PenaltySpec::Tikhonov {
+                    spec.penalties.push(Roughness::Tikhonov {
                         order: ORDER,
                         weight,
                         reference: None,

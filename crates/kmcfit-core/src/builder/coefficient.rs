@@ -35,7 +35,7 @@ pub enum PenaltyWeight {
 
 /// Penalty on a coefficient function p, added to J.
 #[derive(Debug, Clone, PartialEq)]
-pub enum PenaltySpec {
+pub enum Roughness {
     /// `weight * integral (d^order (p - reference)/dt^order)^2 dt`.
     Tikhonov {
         /// Order of the derivative: 0, 1 or 2.
@@ -70,7 +70,7 @@ pub struct CoefficientSpec {
     pub(super) max: Option<TimeHistory>,
     /// Lower bound as a share of the smallest start value.
     min_of_start: Option<f64>,
-    pub(super) penalties: Vec<PenaltySpec>,
+    pub(super) penalties: Vec<Roughness>,
     pub(super) width: Option<f64>,
     /// Known part that is added.
     pub(super) known_part: Option<Box<CoefficientSpec>>,
@@ -203,7 +203,7 @@ impl CoefficientSpec {
     /// Tikhonov penalty `weight * integral (d^order p/dt^order)^2 dt`, `order` 0, 1 or 2.
     #[must_use]
     pub fn tikhonov(self, order: usize, weight: f64) -> Self {
-        self.penalty(PenaltySpec::Tikhonov {
+        self.penalty(Roughness::Tikhonov {
             order,
             weight: PenaltyWeight::Given(weight),
             reference: None,
@@ -214,12 +214,12 @@ impl CoefficientSpec {
     #[must_use]
     pub fn total_variation(self, weight: f64) -> Self {
         let weight = PenaltyWeight::Given(weight);
-        self.penalty(PenaltySpec::TotalVariation { weight })
+        self.penalty(Roughness::TotalVariation { weight })
     }
 
     /// Adds a penalty.
     #[must_use]
-    pub fn penalty(mut self, penalty: PenaltySpec) -> Self {
+    pub fn penalty(mut self, penalty: Roughness) -> Self {
         self.penalties.push(penalty);
         self
     }

@@ -3,7 +3,7 @@
 use super::BuildError;
 use super::record::{ChannelSpec, Record};
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{BaseMotion, Input, InputError, Loss, NoiseModel, Waveform, Weighting};
+use crate::record::{BaseMotion, Input, InputNoise, Loss, NoiseModel, Waveform, Weighting};
 use crate::signal::Signal;
 use crate::solvers::Solver;
 use crate::system::InputQuantity;
@@ -14,7 +14,7 @@ impl Record {
         &self,
         input: &Input,
         record: &str,
-    ) -> Result<Option<InputError>, BuildError> {
+    ) -> Result<Option<InputNoise>, BuildError> {
         let Some(stated) = &self.input_error else {
             return Ok(None);
         };
@@ -44,7 +44,7 @@ impl Record {
                     .expected("one channel, or no sigma of the input"));
             }
         }
-        Ok(Some(InputError {
+        Ok(Some(InputNoise {
             times: signal.times().to_vec(),
             interpolation: signal.interpolation(),
             ..stated.clone()

@@ -45,7 +45,7 @@ mod record;
 mod variations;
 
 pub use basis::{BasisSpec, Knots};
-pub use coefficient::{CoefficientSpec, PenaltySpec, PenaltyWeight, Start};
+pub use coefficient::{CoefficientSpec, PenaltyWeight, Roughness, Start};
 pub use constraints::listed;
 pub use error::{BuildError, Contradiction};
 pub use notice::BuildNotice;

@@ -1,6 +1,6 @@
 //! Penalties of a builder: Tikhonov penalties of its functions.
 
-use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
+use super::coefficient::{PenaltyWeight, Roughness, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::TimeHistory;
 use crate::functions::{Basis, Penalty, WeightRule};
@@ -37,12 +37,12 @@ impl Builder {
             for (i, spec) in entry.spec.penalties.iter().enumerate() {
                 let key = format!("{}.penalty[{i}]", entry.key);
                 let (order, weight, reference) = match spec {
-                    PenaltySpec::Tikhonov {
+                    Roughness::Tikhonov {
                         order,
                         weight,
                         reference,
                     } => (*order, *weight, reference.as_ref()),
-                    PenaltySpec::TotalVariation { weight } => {
+                    Roughness::TotalVariation { weight } => {
                         let function = (j, &basis);
                         search = self.add_variation(problem, function, &key, *weight, search)?;
                         continue;
@@ -188,7 +188,7 @@ fn residuals_at(
     Ok(penalty.residuals(&nearest))
 }
 
-impl PenaltySpec {
+impl Roughness {
     pub(super) fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
         let (order, weight, reference) = match self {
             Self::TotalVariation { weight } => (1, *weight, &None),

@@ -5,7 +5,7 @@ use crate::functions::{CoefficientKind, Prior};
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
 use crate::number_format::significant;
 use crate::record::{
-    BaseMotion, ChannelKind, Input, InputError, InputErrorKind, Loss, NoiseModel, Waveform,
+    BaseMotion, ChannelKind, Input, InputNoise, InputNoiseKind, Loss, NoiseModel, Waveform,
     Weighting,
 };
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
@@ -197,7 +197,7 @@ pub struct Record {
     pub(super) channels: Vec<ChannelSpec>,
     pub(super) coefficients: Vec<(CoefficientKind, CoefficientSpec)>,
     pub(super) validation: bool,
-    pub(super) input_error: Option<InputError>,
+    pub(super) input_error: Option<InputNoise>,
     input: Input,
     force: Option<[Vec<f64>; 2]>,
     base: Option<[Vec<f64>; 2]>,
@@ -271,10 +271,10 @@ impl Record {
     pub fn input_error(
         mut self,
         quantity: InputQuantity,
-        kind: InputErrorKind,
+        kind: InputNoiseKind,
         sigma: f64,
     ) -> Self {
-        self.input_error = Some(InputError {
+        self.input_error = Some(InputNoise {
             quantity,
             kind,
             sigma,

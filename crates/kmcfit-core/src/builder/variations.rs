@@ -1,6 +1,6 @@
 //! Total-variation penalties of a builder.
 
-use super::coefficient::{PenaltySpec, PenaltyWeight};
+use super::coefficient::{PenaltyWeight, Roughness};
 use super::penalties::WeightSearch;
 use super::{BuildError, Builder};
 use crate::functions::{Basis, TotalVariation, WeightRule};
@@ -94,7 +94,7 @@ impl Builder {
         let entries = self.entries();
         let penalties = entries.iter().flat_map(|entry| &entry.spec.penalties);
         let mut rules = penalties.filter_map(|penalty| match penalty {
-            PenaltySpec::Tikhonov {
+            Roughness::Tikhonov {
                 weight: PenaltyWeight::Rule(rule),
                 ..
             } => Some(rule.name()),

@@ -1,6 +1,6 @@
 //! Experiments: input, initial state and channels of one record.
 
-use super::{Channel, Input, InputError};
+use super::{Channel, Input, InputNoise};
 use crate::system::{Excitation, Grid, State};
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ pub struct Experiment {
     /// Input from which the excitation was sampled; empty where the excitation was given on the grid.
     pub input: Input,
     /// Errors of the input, if stated.
-    pub input_error: Option<InputError>,
+    pub input_error: Option<InputNoise>,
     /// Number of nodes of the response; a record may be shorter than the grid.
     pub nodes: usize,
     /// Index of the coefficient set in

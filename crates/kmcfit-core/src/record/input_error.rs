@@ -5,7 +5,7 @@ use crate::system::{Grid, InputQuantity};
 
 /// What the errors of an input are errors of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InputErrorKind {
+pub enum InputNoiseKind {
     /// Noise of the sensor of the input: the system received the true input, which differs from the samples.
     Sensor,
     /// Unmeasured part of the drive: the system received the samples and further, independent input.
@@ -16,11 +16,11 @@ pub enum InputErrorKind {
 /// between the samples: at the samples they are the same, and at a frequency `f` of samples `h` apart their spectrum differs from that of
 /// a smooth interpolation by the factor `sinc^4(f h)`, 2 % at 18 samples a period.
 #[derive(Debug, Clone, PartialEq)]
-pub struct InputError {
+pub struct InputNoise {
     /// The input.
     pub quantity: InputQuantity,
     /// Kind of the errors.
-    pub kind: InputErrorKind,
+    pub kind: InputNoiseKind,
     /// Standard deviation, in the SI unit of the input.
     pub sigma: f64,
     /// Times of the samples of the input, s, increasing; at least two.
@@ -29,7 +29,7 @@ pub struct InputError {
     pub interpolation: Interpolation,
 }
 
-impl InputError {
+impl InputNoise {
     /// For each of the first `nodes` nodes of `grid` the index of the input sample before it, at most the last but one, and the
     /// fraction of the way to the next sample, from 0 to 1.
     pub fn places(&self, grid: &Grid, nodes: usize) -> Vec<(usize, f64)> {
@@ -58,9 +58,9 @@ mod tests {
 
     #[test]
     fn nodes_lie_between_samples_and_values_are_linear_between_them() {
-        let error = InputError {
+        let error = InputNoise {
             quantity: InputQuantity::Force,
-            kind: InputErrorKind::Sensor,
+            kind: InputNoiseKind::Sensor,
             sigma: 1.0,
             times: vec![0.0, 1.0, 3.0],
             interpolation: Interpolation::Linear,

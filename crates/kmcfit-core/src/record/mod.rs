@@ -17,7 +17,7 @@ mod whitening;
 pub use channel::Channel;
 pub use experiment::Experiment;
 pub use input::{BaseMotion, Input, Waveform};
-pub use input_error::{InputError, InputErrorKind};
+pub use input_error::{InputNoise, InputNoiseKind};
 pub use kind::ChannelKind;
 pub use loss::Loss;
 pub use measured::Measurements;

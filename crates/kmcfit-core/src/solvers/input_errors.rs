@@ -20,7 +20,7 @@ use crate::noise::{Correlation, CorrelationLaw, InputErrors, InputRow, InputStep
 use crate::objective::{Evaluation, RowSamples};
 use crate::problem::Problem;
 use crate::record::{
-    Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
+    Channel, ChannelKind, Experiment, Input, InputNoise, InputNoiseKind, NoiseEstimate, Weighting,
 };
 use crate::scalar_search::root;
 use crate::step::SimulationError;
@@ -86,7 +86,7 @@ fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
         let experiment = &mut next.parts_mut().experiments[e];
         experiment.channels[0] = channel.clone();
         let effect = effect.with_ratio(error.sigma / sigma_of(channel));
-        if error.kind == InputErrorKind::Sensor {
+        if error.kind == InputNoiseKind::Sensor {
             let residuals: Vec<f64> = channel.residuals(predicted).map(|r| -r).collect();
             let inputs = effect.smoothed(&residuals, error.times.len());
             let [gain, ..] = channel.sensor().values(&evaluation.scalars);
@@ -110,7 +110,7 @@ fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
 fn add_to_input(
     experiment: &mut Experiment,
     grid: &Grid,
-    error: &InputError,
+    error: &InputNoise,
     inputs: &[f64],
     mut response: Vec<f64>,
 ) {
@@ -144,7 +144,7 @@ pub(crate) fn input_error_effect(
     evaluation: &Evaluation,
     e: usize,
     channel: &Channel,
-    error: &InputError,
+    error: &InputNoise,
     count: usize,
 ) -> InputErrors {
     let view = problem.view(evaluation, e);

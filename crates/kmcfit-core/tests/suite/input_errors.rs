@@ -8,7 +8,7 @@ use crate::common::forced::{self, broadband, rms};
 use kmcfit_core::internals::assessment::{Doubt, Plausibility};
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, InputErrorKind, Weighting};
+use kmcfit_core::internals::record::{ChannelKind, InputNoiseKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Status, fit_with_noise};
 use kmcfit_core::internals::system::{InputQuantity, Method};
 use std::f64::consts::TAU;
@@ -54,8 +54,8 @@ fn accelerations([m, c, k]: [f64; 3], force: &[f64]) -> Vec<f64> {
 struct Case {
     share: f64,
     ratio: f64,
-    is: InputErrorKind,
-    stated: Option<InputErrorKind>,
+    is: InputNoiseKind,
+    stated: Option<InputNoiseKind>,
     /// Multiple of the true sigma of the force that is stated.
     factor: f64,
     /// True if the sigma of the channel is estimated.
@@ -71,7 +71,7 @@ impl Case {
     const PLAIN: Self = Self {
         share: 0.0,
         ratio: 0.03,
-        is: InputErrorKind::Sensor,
+        is: InputNoiseKind::Sensor,
         stated: None,
         factor: 1.0,
         estimates_sigma: false,
@@ -92,8 +92,8 @@ fn fitted(case: Case, seed: u64) -> (Problem, Fit) {
         .map(|(f, e)| f + size * e)
         .collect();
     let (acting, measured) = match case.is {
-        InputErrorKind::Sensor => (&known, &disturbed),
-        InputErrorKind::Drive => (&disturbed, &known),
+        InputNoiseKind::Sensor => (&known, &disturbed),
+        InputNoiseKind::Drive => (&disturbed, &known),
     };
     let clean = match case.kind {
         ChannelKind::Acceleration => accelerations(truth, acting),
@@ -150,7 +150,7 @@ fn summary(errors: &[[f64; 3]]) -> ([usize; 3], [f64; 3]) {
 
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for is in [InputErrorKind::Sensor, InputErrorKind::Drive] {
+    for is in [InputNoiseKind::Sensor, InputNoiseKind::Drive] {
         for ratio in [0.01, 0.03] {
             for share in [0.01, 0.05, 0.1] {
                 cases.push(Case {
@@ -173,7 +173,7 @@ fn errors_of_the_force_pass_into_accelerations_between_nodes() {
     let seeds = seeds(6, 20);
     let case = Case {
         share: 0.05,
-        stated: Some(InputErrorKind::Sensor),
+        stated: Some(InputNoiseKind::Sensor),
         kind: ChannelKind::Acceleration,
         nodes: 4 * SAMPLES / 3,
         ..Case::PLAIN
@@ -204,7 +204,7 @@ fn an_acceleration_has_the_error_of_the_force_at_its_time() {
         .from_state(0.0, 0.0)
         .force(&times, &force())
         .channel(channel)
-        .input_error(InputQuantity::Force, InputErrorKind::Drive, sigma);
+        .input_error(InputQuantity::Force, InputNoiseKind::Drive, sigma);
     let parts = [
         CoefficientSpec::constant(mass),
         CoefficientSpec::fixed(0.0),
@@ -307,7 +307,7 @@ fn errors_of_the_force_are_found() {
 fn a_wrong_sigma_of_the_force_is_contradicted() {
     let case = Case {
         share: 0.05,
-        stated: Some(InputErrorKind::Sensor),
+        stated: Some(InputNoiseKind::Sensor),
         ..Case::PLAIN
     };
     let size = 0.05 * rms(&force());
@@ -336,7 +336,7 @@ fn a_wrong_sigma_of_the_force_is_contradicted() {
 fn the_sigma_of_the_channel_is_estimated_beside_that_of_the_force() {
     let case = Case {
         share: 0.05,
-        stated: Some(InputErrorKind::Sensor),
+        stated: Some(InputNoiseKind::Sensor),
         estimates_sigma: true,
         ..Case::PLAIN
     };
@@ -387,7 +387,7 @@ fn intervals_hold_with_errors_of_the_base() {
                 match error {
                     true => record.input_error(
                         InputQuantity::BaseAcceleration,
-                        InputErrorKind::Sensor,
+                        InputNoiseKind::Sensor,
                         size,
                     ),
                     false => record,

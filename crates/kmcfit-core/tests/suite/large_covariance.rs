@@ -2,9 +2,7 @@
 
 use crate::common::forced::{broadband, response, white};
 use kmcfit_core::internals::assessment::LargeCovariance;
-use kmcfit_core::internals::builder::{
-    Builder, CoefficientSpec, PenaltySpec, PenaltyWeight, Record,
-};
+use kmcfit_core::internals::builder::{Builder, CoefficientSpec, PenaltyWeight, Record, Roughness};
 use kmcfit_core::internals::constraints::Constraint;
 use kmcfit_core::internals::functions::{CoefficientKind, WeightRule};
 use kmcfit_core::internals::identifiability::{Bands, CovarianceKind};
@@ -57,7 +55,7 @@ fn both(problem: &Problem) -> (LargeCovariance, Vec<[f64; 2]>) {
 
 /// A stiffness with one value per step, smoothed by its second derivative.
 fn nodal(spacing: f64, samples: usize, seed: u64, weight: PenaltyWeight) -> Builder {
-    let stiffness = CoefficientSpec::nodal(55.0).penalty(PenaltySpec::Tikhonov {
+    let stiffness = CoefficientSpec::nodal(55.0).penalty(Roughness::Tikhonov {
         order: 2,
         weight,
         reference: None,

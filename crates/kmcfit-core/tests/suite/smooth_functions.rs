@@ -7,7 +7,7 @@ use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
 use kmcfit_core::internals::assessment::BasisTest;
 use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, PenaltySpec, PenaltyWeight, Record,
+    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, PenaltyWeight, Record, Roughness,
     Start,
 };
 use kmcfit_core::internals::functions::WeightRule;
@@ -61,8 +61,8 @@ fn noise(seed: u64, coefficient: f64) -> Vec<f64> {
 
 type Data = (Vec<f64>, Vec<f64>, Vec<f64>);
 
-fn penalty(rule: WeightRule) -> PenaltySpec {
-    PenaltySpec::Tikhonov {
+fn penalty(rule: WeightRule) -> Roughness {
+    Roughness::Tikhonov {
         order: 2,
         weight: PenaltyWeight::Rule(rule),
         reference: None,

@@ -11,7 +11,7 @@ use kmcfit_core::internals::functions::{
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
-    Channel, ChannelKind, Experiment, InputError, InputErrorKind, Sensor, Weighting,
+    Channel, ChannelKind, Experiment, InputNoise, InputNoiseKind, Sensor, Weighting,
 };
 use kmcfit_core::internals::signal::Interpolation;
 use kmcfit_core::internals::solvers::{FitSettings, QpSolver, Status, fit, fit_with_noise};
@@ -409,9 +409,9 @@ fn errors_with_noisy_force(states_noise: bool) -> Vec<f64> {
             .with_excitation(on_second(&measured))
             .with_channel(channel.observing(Ends::ground(1)));
         let record = Experiment {
-            input_error: states_noise.then(|| InputError {
+            input_error: states_noise.then(|| InputNoise {
                 quantity: InputQuantity::Force,
-                kind: InputErrorKind::Sensor,
+                kind: InputNoiseKind::Sensor,
                 sigma: of_force,
                 times: grid.times(),
                 interpolation: Interpolation::Linear,

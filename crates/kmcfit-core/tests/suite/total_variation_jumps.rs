@@ -7,7 +7,7 @@ use crate::common::counts::{seeds, widened};
 use crate::common::synthetic::with_noise;
 use kmcfit_core::internals::assessment::FitAssessment;
 use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, CoefficientSpec, Knots, PenaltySpec, PenaltyWeight, Record, Start,
+    BasisSpec, Builder, CoefficientSpec, Knots, PenaltyWeight, Record, Roughness, Start,
 };
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::{Classification, Condition};
@@ -60,7 +60,7 @@ fn problem(levels: &[f64], jumps: &[f64], basis: BasisSpec, seed: u64) -> Proble
     let parts = [
         CoefficientSpec::fixed(MASS),
         CoefficientSpec::constant(0.1),
-        stiffness.penalty(PenaltySpec::TotalVariation { weight }),
+        stiffness.penalty(Roughness::TotalVariation { weight }),
     ];
     let record = Record::new("decay").from_state(1.0, 0.0);
     let record = record.displacement(&times, &samples).sigma(sigma);

@@ -16,9 +16,9 @@ use crate::config::alternatives::ScalarOr;
 use crate::config::lowering::Place;
 use crate::config::spec::{
     EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
-    SensorSpec,
+    SensorKeys,
 };
-use crate::config::values::{Estimate, NumberOrEstimate};
+use crate::config::values::{EstimateWord, NumberOrEstimate};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::Unit;
@@ -30,7 +30,7 @@ pub(in crate::config) use excitation::known_stretches;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
 use kmcfit_core::internals::record::{
-    BaseMotion, ChannelKind, Experiment, Input, InputErrorKind, Waveform,
+    BaseMotion, ChannelKind, Experiment, Input, InputNoiseKind, Waveform,
 };
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
@@ -265,7 +265,7 @@ pub(super) fn specification(
     let spec = entry.spec;
     let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
     let initial = match &spec.initial {
-        InitialSpec::Scalar(Estimate) => [&estimate, &estimate],
+        InitialSpec::Scalar(EstimateWord) => [&estimate, &estimate],
         InitialSpec::Map(state) => [&state.displacement, &state.velocity],
     };
     let mut found = builder::Record::new(entry.name()).initial(initial.map(scalar));
@@ -279,8 +279,8 @@ pub(super) fn specification(
     }
     if let Some((quantity, error)) = input_sigma(entry)? {
         let kind = match error.kind {
-            InputErrorName::Sensor => InputErrorKind::Sensor,
-            InputErrorName::Drive => InputErrorKind::Drive,
+            InputErrorName::Sensor => InputNoiseKind::Sensor,
+            InputErrorName::Drive => InputNoiseKind::Drive,
         };
         found = found.input_error(quantity, kind, error.value.0);
     }
@@ -336,7 +336,7 @@ fn scalar(given: &EstimateValue) -> ScalarSpec {
 }
 
 fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<ScalarSpec>) -> ChannelSpec {
-    let sensor = |given: &SensorSpec| builder::SensorSpec {
+    let sensor = |given: &SensorKeys| builder::SensorSpec {
         gain: given.gain.as_ref().map(scalar),
         offset: given.offset.as_ref().map(scalar),
         drift: given.drift.as_ref().map(scalar),

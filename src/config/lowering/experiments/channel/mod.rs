@@ -11,7 +11,7 @@ use crate::config::alternatives::ScalarOr;
 use crate::config::lowering::Place;
 use crate::config::lowering::experiments::Entry;
 use crate::config::spec::{
-    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
+    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorKeys,
 };
 use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
@@ -81,7 +81,7 @@ struct Spec<'a> {
     sigma: Option<&'a Sigma>,
     loss: Option<&'a ScalarOr<LossName, LossSpec>>,
     noise: Option<&'a ScalarOr<CorrelationName, CorrelationSpec>>,
-    sensor: Option<&'a SensorSpec>,
+    sensor: Option<&'a SensorKeys>,
 }
 
 fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
@@ -106,7 +106,7 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
 }
 
 /// Settings of the sensor of a channel in the model file.
-pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
+pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorKeys> {
     spec_of(spec, kind).sensor
 }
 
