@@ -216,7 +216,7 @@ keys! {
             example "data",
             default "functions",
             needs "a method other than equation-error";
-        /// GradientName of the cost.
+        /// Gradient of the cost.
         gradient: Option<GradientName>,
             example "continuous",
             default "discrete",
@@ -272,7 +272,7 @@ choice! {
 }
 
 choice! {
-    /// GradientName of the cost.
+    /// Gradient of the cost.
     pub type GradientName = kmcfit_core::internals::objective::GradientKind {
         /// Exact gradient of the discretised cost (discrete adjoint).
         Discrete = "discrete",

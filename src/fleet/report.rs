@@ -21,7 +21,7 @@ struct Collected<'a> {
     distributions: Vec<Distribution>,
     /// Records with the verdicts Adequate, Check and Inadequate.
     verdicts: [usize; 3],
-    /// FleetRecord and reason.
+    /// Record and reason.
     errors: Vec<[String; 2]>,
 }
 

@@ -2,7 +2,7 @@
 //! (RIFX).
 //!
 //! Integers are divided by their full scale, so that samples are fractions from -1 to 1. References: Microsoft,
-//! "Multiple FileChannel Audio Data and WAVE Files"; EBU Tech 3306 for RF64.
+//! "Multiple Channel Audio Data and WAVE Files"; EBU Tech 3306 for RF64.
 
 use std::path::Path;
 

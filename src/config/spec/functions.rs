@@ -10,7 +10,7 @@ use crate::config::values::{
 keys! {
     /// A coefficient function: estimated, with a basis and start values, or fixed.
     pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
-        /// BasisName of an estimated function, which defines its parameters.
+        /// Basis of an estimated function, which defines its parameters.
         basis: Option<BasisName>,
             example "piecewise-linear",
             needs "`start`";
@@ -78,7 +78,7 @@ keys! {
 }
 
 choice! {
-    /// BasisName of a coefficient function.
+    /// Basis of a coefficient function.
     pub enum BasisName {
         /// One parameter per node of the grid.
         Nodal = "nodal",

@@ -2,7 +2,7 @@
 //!
 //! Each subproblem is a least-squares problem in residual form with linear and second-order-cone constraints ([`Subproblem`]).
 //! [`Subproblem::solve_equality_constrained`] solves it with its equalities only, by one elimination or one sparse factorisation;
-//! [`Subproblem::solve`] solves the full problem by Clarabel.
+//! [`Subproblem::solve`] the full problem: by an interior point along time, in few variables by active sets, otherwise by Clarabel.
 
 mod chain;
 mod clarabel;

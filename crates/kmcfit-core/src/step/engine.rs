@@ -59,9 +59,10 @@ macro_rules! with_model {
         match driven.system.method {
             Method::Midpoint if links == LINEAR => $call(driven.model::<2, _>(&MIDPOINT, links), $($argument),*),
             Method::Midpoint => $call(driven.model::<MOST_ELEMENTS, _>(&MIDPOINT, links), $($argument),*),
-            _ if links == LINEAR => $call(driven.model::<2, _>(&RK4, links), $($argument),*),
-            _ if links == DUFFING => $call(driven.model::<3, _>(&RK4, links), $($argument),*),
-            _ => $call(driven.model::<MOST_ELEMENTS, _>(&RK4, links), $($argument),*),
+            Method::Rk4 if links == LINEAR => $call(driven.model::<2, _>(&RK4, links), $($argument),*),
+            Method::Rk4 if links == DUFFING => $call(driven.model::<3, _>(&RK4, links), $($argument),*),
+            Method::Rk4 => $call(driven.model::<MOST_ELEMENTS, _>(&RK4, links), $($argument),*),
+            Method::ImplicitMidpoint => unreachable!("implicit steps are assembled"),
         }
     }};
 }

@@ -176,7 +176,7 @@ impl Structure {
         self.coordinates
     }
 
-    /// True for one coordinate with its mass, and some elements between it and the ground.
+    /// True for one coordinate with its mass, and elements of the table between it and the ground: its explicit steps are compiled.
     pub fn is_one(&self) -> bool {
         self.links.is_some()
     }
@@ -252,15 +252,19 @@ impl Structure {
     /// hysteresis; `None`
     /// where the mass matrix is not positive definite.
     pub fn eigenvalues(&self, functions: &[f64]) -> Option<Vec<f64>> {
-        self.relative_to_mass(Law::Stiffness, functions)
+        self.relative_to_mass(is_spring, functions)
     }
 
     /// A bound of the rates `|lambda|`, 1/s, of solutions `exp(lambda t)`: the square root of the largest eigenvalue of the linear springs, or
     /// the largest one of the linear dampers, whichever is larger. It holds for coefficients that are not negative, and for functions of
     /// time with the least inertias and the largest coefficients.
     pub fn largest_rate(&self, functions: &[f64]) -> Option<f64> {
-        let largest = |law| Some(self.relative_to_mass(law, functions)?.last()?.max(0.0));
-        Some(largest(Law::Stiffness)?.sqrt().max(largest(Law::Damping)?))
+        let largest = |is_meant: fn(Law) -> bool| {
+            Some(self.relative_to_mass(is_meant, functions)?.last()?.max(0.0))
+        };
+        // A spring beyond a gap acts in part of the motion.
+        let springs = largest(|law| is_spring(law) || matches!(law, Law::Gap { .. }))?;
+        Some(springs.sqrt().max(largest(|law| law == Law::Damping)?))
     }
 
     /// [`Structure::largest_rate`] of functions of time, given by their values.
@@ -277,8 +281,12 @@ impl Structure {
         self.largest_rate(&extremes.collect::<Vec<f64>>())
     }
 
-    /// Eigenvalues of the matrix of all elements of a law relative to the mass matrix, ascending.
-    fn relative_to_mass(&self, law: Law, functions: &[f64]) -> Option<Vec<f64>> {
+    /// Eigenvalues of the matrix of all elements of some laws relative to the mass matrix, ascending.
+    fn relative_to_mass(
+        &self,
+        is_meant: impl Fn(Law) -> bool,
+        functions: &[f64],
+    ) -> Option<Vec<f64>> {
         let n = self.coordinates;
         let count = self.inertias.len();
         let sum = |wanted: &dyn Fn(usize) -> bool| {
@@ -296,9 +304,7 @@ impl Structure {
             matrix
         };
         let mass = sum(&|f| f < count).cholesky()?;
-        let is_spring = |other: Law| law == Law::Stiffness && other.has_internal_state();
-        let is_wanted = |other: Law| other == law || is_spring(other);
-        let of_law = sum(&|row| row >= count && is_wanted(self.laws[row - count]));
+        let of_law = sum(&|row| row >= count && is_meant(self.laws[row - count]));
         let half = mass.l().solve_lower_triangular(&of_law)?;
         let mut whole = mass.l().solve_lower_triangular(&half.transpose())?;
         whole = 0.5 * (&whole + whole.transpose());
@@ -312,4 +318,9 @@ impl Structure {
 fn free(ends: &Ends, coordinates: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
     let entries = ends.entries().iter().copied();
     entries.filter(move |(j, _)| *j < coordinates)
+}
+
+/// True for linear springs, and hysteresis by its first slope.
+fn is_spring(law: Law) -> bool {
+    law == Law::Stiffness || law.has_internal_state()
 }

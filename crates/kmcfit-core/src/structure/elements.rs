@@ -1,6 +1,7 @@
 //! Coefficients and their elements: the table of names, units and laws, and the laws with the derivatives of their forces.
 //!
-//! To add an element: a variant of [`Law`] with `phi` and `slopes`, a row of the table with its kind, and a test.
+//! To add an element: a variant of [`Law`] with `phi` and `slopes`, a row of the table, and a test; a kind that the program names gets a constant of
+//! [`CoefficientKind`].
 
 use crate::simd::Real;
 use serde::de::Error;
@@ -252,7 +253,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
 ];
 
-/// Largest number of elements of one coordinate: one of each row.
+/// Largest number of elements of one coordinate whose steps are compiled: one of each row; others are assembled.
 pub const MOST_ELEMENTS: usize = TABLE.len() - 1;
 
 /// Kind of a coefficient function of the equation of motion: a row of the table.

@@ -30,14 +30,17 @@ impl System {
             let rate = self.structure.largest_rate_of(nodal.functions());
             return rate.unwrap_or(0.0);
         }
-        let of = |wanted: Law| {
-            let index = self.laws().iter().position(|term| *term == wanted);
-            index.and_then(|index| nodal.coefficients.get(index))
+        let sum = |is_meant: fn(&Law) -> bool, i: usize| -> f64 {
+            let terms = self.laws().iter().zip(&nodal.coefficients);
+            let values = terms.filter(|(law, _)| is_meant(law)).map(|(_, p)| p[i]);
+            values.sum()
         };
-        let (damping, stiffness) = (of(Law::Damping), of(Law::Stiffness));
-        let value = |f: Option<&Vec<f64>>, i: usize| f.map_or(0.0, |f| f[i]);
-        let rates = (nodal.inertias[0].iter().enumerate())
-            .map(|(i, m)| rate(*m, value(damping, i), value(stiffness, i)));
+        let rates = (nodal.inertias[0].iter().enumerate()).map(|(i, m)| {
+            let damping = sum(|law| *law == Law::Damping, i);
+            // A spring beyond a gap acts in part of the motion.
+            let stiffness = sum(|law| matches!(law, Law::Stiffness | Law::Gap { .. }), i);
+            rate(*m, damping, stiffness)
+        });
         rates.filter(|rate| rate.is_finite()).fold(0.0, f64::max)
     }
 }

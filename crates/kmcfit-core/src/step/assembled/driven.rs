@@ -109,7 +109,9 @@ impl Driven<'_> {
                     Ok(rows) => take(&x, &rows),
                     Err(_) => {
                         x.fill(f64::NAN);
-                        take(&x, &vec![StepRow::zeros(motion.structure); x.len()]);
+                        let mut row = StepRow::zeros(motion.structure);
+                        row.state.fill(f64::NAN);
+                        take(&x, &vec![row; x.len()]);
                     }
                 }
             }
@@ -131,6 +133,8 @@ impl Driven<'_> {
                 let before = x;
                 let Ok(rows) = motion.step_derivatives(i, &mut x) else {
                     maps.increment.iter_mut().for_each(|row| row[l] = f64::NAN);
+                    let growth = maps.growth.as_flattened_mut();
+                    growth.iter_mut().for_each(|row| row[l] = f64::NAN);
                     continue;
                 };
                 for (end, row) in rows.iter().enumerate() {

@@ -95,7 +95,7 @@ pub(super) struct Internal<T> {
 pub(crate) enum Unsolved {
     /// The matrix of masses is not positive definite.
     Mass,
-    /// Newton's method does not converge.
+    /// The equation of an implicit step has no solution, or Newton's method does not converge.
     Newton,
 }
 
@@ -375,6 +375,7 @@ impl<T: Scalar> Stage<T> {
         if !depends_on_state && self.factorised == functions {
             return Ok(());
         }
+        let masses_are_known = self.factorised.get(..count) == functions.get(..count);
         self.factorised.clear();
         self.factorised.extend_from_slice(functions);
         self.matrix.fill(self.q[0].like(0.0));
@@ -383,6 +384,14 @@ impl<T: Scalar> Stage<T> {
                 .add(structure.pattern(f), self.values.functions[f]);
         }
         if h != 0.0 {
+            if !masses_are_known {
+                let mut masses = self.matrix.clone();
+                masses.factorise();
+                if !masses.diagonal().all(|d| d.value() > 0.0) {
+                    self.factorised.clear();
+                    return Err(Unsolved::Mass);
+                }
+            }
             self.set_slopes(structure, h);
             for (e, [by_q, by_v]) in self.slopes.iter().enumerate() {
                 let factor = by_v.scale(h) + by_q.scale(h * h);
@@ -396,7 +405,10 @@ impl<T: Scalar> Stage<T> {
             true => Ok(()),
             false => {
                 self.factorised.clear();
-                Err(Unsolved::Mass)
+                Err(match h == 0.0 {
+                    true => Unsolved::Mass,
+                    false => Unsolved::Newton,
+                })
             }
         }
     }

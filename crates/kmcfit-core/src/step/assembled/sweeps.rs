@@ -30,7 +30,7 @@ pub struct Motion<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("{} in the step from node {node}", match .cause {
     Cause::Mass => "the mass matrix is not positive definite",
-    Cause::NoConvergence => "Newton's method does not converge",
+    Cause::NoConvergence => "an implicit step has no solution",
     Cause::Overflow | Cause::CostOverflow => "the response overflows",
 })]
 pub struct MotionError {
