@@ -2,9 +2,9 @@
 
 use super::assumptions::assumptions;
 use super::document::IdentifiabilitySummary;
-use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
+use super::{doubts, findings};
 use crate::finding::Finding;
 use crate::number_format::resolved;
 use kmcfit_core::internals::assessment::{Doubt, FunctionSummary, Severity, function_summaries};
@@ -41,7 +41,7 @@ impl FittedModel<'_> {
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
             summary.unidentified = true;
-            found.push(findings::unidentified(reason).rated(Severity::Inadequate));
+            found.push(doubts::unidentified(reason).rated(Severity::Inadequate));
             return (summary, found);
         }
         let classifications = &assessment.classifications;
@@ -74,18 +74,20 @@ impl FittedModel<'_> {
             is_damping && negative.is_some()
         };
         let warnings = plausibility.warnings.iter().filter(|w| !is_replaced(w));
-        warnings.for_each(|warning| found.push(findings::doubt(warning)));
+        warnings.for_each(|warning| found.push(doubts::doubt(warning)));
         negative.clone().into_iter().for_each(|n| found.push(n));
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
-        poor.for_each(|doubt| found.push(findings::doubt(&doubt)));
+        poor.for_each(|doubt| found.push(doubts::doubt(&doubt)));
         (summary, found)
     }
 
     /// The doubts of the assessment.
     pub(super) fn doubts(&self) -> Vec<Doubt> {
         let assessment = self.run_assessment.assessment.iter();
-        let warnings = assessment.flat_map(|a| a.plausibility.warnings.iter().cloned());
+        // Of an optimum that identifies no system nothing else is said.
+        let identified = assessment.filter(|a| a.plausibility.unidentified.is_none());
+        let warnings = identified.flat_map(|a| a.plausibility.warnings.iter().cloned());
         let missing = self.run_assessment.missing_terms.iter();
         warnings
             .chain(missing.map(|term| Doubt::MissingTerm(*term)))
@@ -121,7 +123,7 @@ impl FittedModel<'_> {
         let biased = findings::equation_error(equation.as_ref().err());
         found.push(biased.rated(Severity::Warning));
         let missing = self.run_assessment.missing_terms.iter();
-        let missing = missing.map(|term| findings::doubt(&Doubt::MissingTerm(*term)));
+        let missing = missing.map(|term| doubts::doubt(&Doubt::MissingTerm(*term)));
         missing.for_each(|warning| found.push(warning));
         let Ok(intervals) = equation else {
             return;

@@ -25,6 +25,7 @@ mod completed_fit;
 mod cost;
 mod csv;
 pub mod document;
+mod doubts;
 mod equation;
 mod extent;
 pub mod figures;

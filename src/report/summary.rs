@@ -4,9 +4,9 @@ use super::answer::answer_table;
 use super::document::{
     AttemptSummary, ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
 };
+use super::doubts;
 use super::equation::equation_residual;
 use super::extent::{extent, validation};
-use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
 use super::suggestions::percent;
@@ -171,7 +171,7 @@ fn fit(document: &ResultDocument) -> Vec<String> {
         !c.agrees || high - low <= UNSHARP * c.frequency
     };
     let classical = document.classical.as_ref().filter(is_sharp);
-    let classical = classical.map(findings::classical);
+    let classical = classical.map(doubts::classical);
     std::iter::once(text).chain(classical).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Reasons of the verdict on a fit in words, each a clause of one line.
 
 use super::document::{Estimates, Verdict};
-use super::findings::doubt;
+use super::doubts::doubt;
 use super::fit_assessment::ValidationRecord;
 use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;

@@ -4,7 +4,7 @@ use super::table::{paragraph, table};
 use crate::number_format::{at_most, significant};
 use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
-use crate::report::findings;
+use crate::report::doubts;
 use crate::report::text::decade;
 use kmcfit_core::internals::assessment::{
     BasisComparison, EXACT, Extension, ExtensionTest, ModelTests,
@@ -35,7 +35,7 @@ pub(super) fn checks(document: &ResultDocument) -> String {
         text += &bases(tests);
         text += &extensions(document, tests);
     }
-    let classical = document.classical.as_ref().map(findings::classical);
+    let classical = document.classical.as_ref().map(doubts::classical);
     text + &classical.map_or(String::new(), |classical| {
         paragraph(&format!("Classical estimate: {classical}."))
     })

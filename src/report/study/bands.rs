@@ -4,7 +4,7 @@ use super::document::*;
 use super::records::{Optimum, finite_numbers};
 use crate::config::Model;
 use crate::number_format::{resolved, significant};
-use crate::report::findings;
+use crate::report::doubts;
 use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::normal_half_width;
 use kmcfit_core::internals::functions::Ratios;
@@ -27,8 +27,8 @@ pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
         false => Vec::new(),
     };
     let mut notes = bands.notes.clone();
-    notes.extend((plausibility.unidentified.iter()).map(|why| findings::unidentified(why).text));
-    notes.extend((plausibility.warnings.iter()).map(|w| findings::doubt(w).text));
+    notes.extend((plausibility.unidentified.iter()).map(|why| doubts::unidentified(why).text));
+    notes.extend((plausibility.warnings.iter()).map(|w| doubts::doubt(w).text));
     let ratios = truth.map(Ratios::of);
     let of_ratio = |part: fn(&Ratios) -> &Vec<f64>| ratios.as_ref().map(|r| part(r).as_slice());
     let list = bands.functions.iter().chain(&bands.ratios);

@@ -64,7 +64,7 @@ enum Products {
         lags: Vec<Vec<DMatrix<f64>>>,
         /// Number of these rows.
         usual: usize,
-        /// The rows up to the last of the others, which are whitened anew at each point, as columns.
+        /// The rows up to the last of the others, which are whitened anew at each point.
         rows: DMatrix<f64>,
         correlation: Correlation,
     },
@@ -120,7 +120,7 @@ impl ChannelMoments {
                 let variance = process.innovation_variance();
                 let minus = process.coefficients().iter().map(|a| -a);
                 let filter: Vec<f64> = std::iter::once(1.0).chain(minus).collect();
-                let mut gram = DMatrix::zeros(rows.nrows(), rows.nrows());
+                let mut gram = DMatrix::zeros(rows.ncols(), rows.ncols());
                 for (k, a) in filter.iter().enumerate() {
                     for (l, b) in filter.iter().enumerate() {
                         gram += &lags[k][l] * (a * b / variance);
@@ -129,14 +129,15 @@ impl ChannelMoments {
                 let mut determinant = *usual as f64 * variance.ln();
                 let mut others = Vec::new();
                 correlation.each_first_row(|i, coefficients, size| {
-                    let mut error = rows.column(i).into_owned();
-                    let earlier = (0..i).rev().zip(coefficients);
-                    earlier.for_each(|(j, a)| error.axpy(-a, &rows.column(j), 1.0));
-                    others.extend(error.iter().map(|e| size * e));
+                    others.extend(rows.column_iter().map(|column| {
+                        let earlier = column.as_slice()[..i].iter().rev();
+                        let predicted: f64 = earlier.zip(coefficients).map(|(u, a)| a * u).sum();
+                        size * (column[i] - predicted)
+                    }));
                     determinant -= 2.0 * size.ln();
                 });
-                let count = others.len() / rows.nrows();
-                let others = DMatrix::from_vec(rows.nrows(), count, others);
+                let count = others.len() / rows.ncols();
+                let others = DMatrix::from_vec(rows.ncols(), count, others);
                 (gram + &others * others.transpose(), determinant)
             }
         }
@@ -170,7 +171,7 @@ fn autoregressive(
     Products::Autoregressive {
         lags,
         usual: runs.iter().map(usual).sum(),
-        rows: rows.rows(0, needed).transpose(),
+        rows: rows.rows(0, needed).into_owned(),
         correlation: correlation.clone(),
     }
 }

@@ -85,7 +85,7 @@ pub(super) fn search_prepared(
         clock: Instant::now(),
         timings: Timings::default(),
         progress: None,
-        trouble: None,
+        failure: None,
         outcome: None,
         observer,
     };
@@ -135,7 +135,7 @@ struct SearchDriver<'a, 'w> {
     /// `None` before initialisation, and where the simulation at the start fails.
     progress: Option<SearchProgress>,
     /// Error of the simulation at the start.
-    trouble: Option<SimulationError>,
+    failure: Option<SimulationError>,
     outcome: Option<Outcome>,
     observer: &'a mut Observer<'w>,
 }
@@ -250,7 +250,7 @@ impl SearchDriver<'_, '_> {
     fn finish(self, counts: SolveCounts) -> Result<Fit, SimulationError> {
         let elapsed = self.clock.elapsed();
         let Some(SearchProgress { point, recorder }) = self.progress else {
-            return Err(self.trouble.expect("a search starts, or there is a reason"));
+            return Err(self.failure.expect("a search starts, or there is a reason"));
         };
         Ok(Fit {
             best: point,
@@ -292,7 +292,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_>
         let mut work = CountedEvaluator::new(problem, self.settings);
         match self.start(&mut work, parameters) {
             Ok(progress) => self.progress = Some(progress),
-            Err(trouble) => self.trouble = Some(trouble),
+            Err(failure) => self.failure = Some(failure),
         }
         self.timings += work.timings;
         self.outcome = self.nothing_to_do(problem.problem);
@@ -316,7 +316,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_>
             .outcome
             .as_ref()
             .map(|outcome| outcome.reason.to_string());
-        match outcome.or_else(|| Some(self.trouble?.to_string())) {
+        match outcome.or_else(|| Some(self.failure?.to_string())) {
             Some(why) => TerminationStatus::Terminated(TerminationReason::SolverExit(why)),
             None => TerminationStatus::NotTerminated,
         }

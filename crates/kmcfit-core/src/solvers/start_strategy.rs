@@ -87,7 +87,7 @@ struct Attempts<'a, 'w> {
     timings: Timings,
     best: Option<Fit>,
     attempts: Vec<Attempt>,
-    trouble: Option<SimulationError>,
+    failure: Option<SimulationError>,
 }
 
 impl<'a, 'w> Attempts<'a, 'w> {
@@ -116,7 +116,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             timings: Timings::default(),
             best: None,
             attempts: Vec::new(),
-            trouble: None,
+            failure: None,
         }
     }
 
@@ -188,7 +188,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             }
             Err(breakdown) => {
                 self.attempts.push(Attempt::failed(strategy, breakdown));
-                self.trouble.get_or_insert(breakdown);
+                self.failure.get_or_insert(breakdown);
                 !self.has_several
             }
         }
@@ -259,7 +259,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
     fn finish(mut self) -> Result<Fit, SimulationError> {
         let Some(mut fit) = self.best else {
             return Err(self
-                .trouble
+                .failure
                 .expect("every attempt ends with a fit or a breakdown"));
         };
         let is_limited = self.has_several && self.settings.stopping.has_test();

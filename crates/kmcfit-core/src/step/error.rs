@@ -13,7 +13,7 @@ pub enum Cause {
     Mass,
     /// The response exceeds the floating-point range.
     Overflow,
-    /// Newton's method does not solve an implicit step.
+    /// An implicit step has no solution, or Newton's method does not find it.
     NoConvergence,
     /// The square of a residual exceeds the floating-point range.
     CostOverflow,
@@ -46,7 +46,7 @@ impl SimulationError {
             ),
             Cause::Overflow => format!("the response overflows at t = {time} s"),
             Cause::NoConvergence => {
-                format!("Newton's method does not solve the implicit step from t = {time} s")
+                format!("the implicit step from t = {time} s has no solution")
             }
             Cause::CostOverflow => {
                 format!("the cost overflows: the residual at t = {time} s is {value:.3e}")

@@ -122,11 +122,17 @@ fn range(term: Option<&Law>) -> std::ops::Range<f64> {
     }
 }
 
-/// A function: nodal values, or a constant.
+/// A function: nodal values, a constant, or two levels.
 fn function(range: std::ops::Range<f64>, nodes: usize) -> impl Strategy<Value = Vec<f64>> {
+    let levels = (range.clone(), range.clone(), 0..nodes);
     prop_oneof![
         prop::collection::vec(range.clone(), nodes),
-        range.prop_map(move |x| vec![x; nodes])
+        range.prop_map(move |x| vec![x; nodes]),
+        levels.prop_map(move |(first, second, place)| {
+            let mut values = vec![first; nodes];
+            values[place..].fill(second);
+            values
+        })
     ]
 }
 

@@ -82,7 +82,7 @@ impl StepRule for GaussNewton {
                     return Step::Minimum(Reason::NegligibleResiduals);
                 }
                 ProposalOutcome::Unsolved(status) => {
-                    linear.trouble = Some(status);
+                    linear.failure = Some(status);
                     self.damping *= 10.0;
                     continue;
                 }
@@ -90,14 +90,14 @@ impl StepRule for GaussNewton {
             let result = work.evaluate_into(&proposal.parameters, &mut evaluation);
             let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
             let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
-            if linear.trouble.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
+            if linear.failure.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
                 // Without the effect of damping caused by failed programs.
                 break;
             }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
-                if linear.trouble.is_some() || !proposal.is_solved {
-                    linear.trouble.get_or_insert(ConicStatus::Almost);
+                if linear.failure.is_some() || !proposal.is_solved {
+                    linear.failure.get_or_insert(ConicStatus::Almost);
                     // The following programs differ and may be solved with less damping.
                     self.damping = before;
                 }
@@ -108,7 +108,7 @@ impl StepRule for GaussNewton {
                 linear.linearise_again(work, point);
                 continue;
             }
-            if linear.trouble.is_none()
+            if linear.failure.is_none()
                 && let Some(reason) = at_minimum(problem, point, &proposal)
             {
                 let decrease = decrease.unwrap_or(f64::INFINITY);
@@ -121,12 +121,12 @@ impl StepRule for GaussNewton {
             }
             if !proposal.is_solved {
                 // A shorter step predicts less because it is short.
-                linear.trouble.get_or_insert(ConicStatus::Almost);
+                linear.failure.get_or_insert(ConicStatus::Almost);
             }
             self.damping *= 8.0;
         }
         self.damping = FIRST_DAMPING;
-        match linear.trouble {
+        match linear.failure {
             Some(status) => no_step(problem, point, status),
             None => Step::Stuck(Reason::NoLowerGaussNewtonStep),
         }
@@ -165,7 +165,7 @@ struct LinearisedProblem {
     /// Diagonal of the proximal term.
     scales: Vec<f64>,
     /// Status of the last program that was not solved to full accuracy.
-    trouble: Option<ConicStatus>,
+    failure: Option<ConicStatus>,
 }
 
 impl LinearisedProblem {
@@ -176,7 +176,7 @@ impl LinearisedProblem {
             sub: subproblem(work, point, &linearization),
             linearization,
             scales: point.relative_metric(work.problem()),
-            trouble: None,
+            failure: None,
         }
     }
 
@@ -214,7 +214,7 @@ impl LinearisedProblem {
         Step::Moved {
             point: Box::new(moved),
             length: 1.0,
-            limited: self.trouble.is_some(),
+            limited: self.failure.is_some(),
         }
     }
 }
