@@ -15,9 +15,8 @@ pub mod assessment {
 }
 pub mod builder {
     pub use crate::builder::{
-        BasisSpec, BuildError, BuildNotice, Builder, ChannelSpec, CoefficientSpec, Contradiction,
-        Knots, PenaltyWeight, Record, Roughness, ScalarSpec, SensorSpec, Start, WeightSearch,
-        listed,
+        BuildError, BuildNotice, Builder, ChannelSpec, Contradiction, Record, ScalarSpec,
+        SensorSpec, UNKNOWN_MASS, WeightSearch, listed,
     };
 }
 pub mod constraints {

@@ -1,6 +1,6 @@
 //! Constraints of a builder: their rows, and the projection of the start.
 
-use super::coefficient::uncrossed;
+use super::coefficient::{limit, uncrossed};
 use super::coefficient_sets::FunctionEntry;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
 use crate::constraints::{Constraint, ConstraintError, Constraints, Shape, TOLERANCE, TimeHistory};
@@ -34,7 +34,7 @@ pub(super) fn of_bounds(
     coefficient_set: usize,
 ) -> Vec<ConstraintSpec> {
     let (of, key) = (entry.kind, entry.key.as_str());
-    let (min, max) = (entry.spec.lower_bound(start), entry.spec.max.clone());
+    let (min, max) = (entry.spec.lower_bound(start), entry.spec.upper_bound());
     let constraint = |name: &str, min, max| ConstraintSpec {
         key: format!("{key}.{name}"),
         statement: Constraint::Bounds { of, min, max },
@@ -143,11 +143,10 @@ impl Builder {
             TimeHistory::Nodal { .. } => true,
         };
         let entries = self.entries();
-        let own = entries
-            .iter()
-            .map(|entry| (&entry.spec.min, &entry.spec.max));
+        let own = entries.iter();
+        let own = own.map(|entry| (limit(entry.spec.min.as_ref()), entry.spec.upper_bound()));
         let listed = self.constraints.iter().filter_map(|c| match &c.statement {
-            Constraint::Bounds { min, max, .. } => Some((min, max)),
+            Constraint::Bounds { min, max, .. } => Some((min.clone(), max.clone())),
             _ => None,
         });
         let all: Vec<_> = own.chain(listed).collect();

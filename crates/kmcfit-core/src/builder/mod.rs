@@ -5,7 +5,8 @@
 //! give the same problems and errors; the key of a [`BuildError`] is that of the model file.
 //!
 //! ```
-//! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record};
+//! use kmcfit_core::model::CoefficientSpec;
+//! use kmcfit_core::{Builder, CoefficientKind, Record};
 //!
 //! // A free decay of one second: m = 1 kg, c = 2 N s/m, k = 2500 N/m, so 8 Hz.
 //! let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
@@ -44,8 +45,7 @@ mod penalties;
 mod record;
 mod variations;
 
-pub use basis::{BasisSpec, Knots};
-pub use coefficient::{CoefficientSpec, PenaltyWeight, Roughness, Start};
+pub use coefficient::UNKNOWN_MASS;
 pub use constraints::listed;
 pub use error::{BuildError, Contradiction};
 pub use notice::BuildNotice;
@@ -54,6 +54,7 @@ pub use record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
 
 use crate::constraints::Constraint;
 use crate::functions::{CoefficientKind, ScalarParameter};
+use crate::model::CoefficientSpec;
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::solvers::Solver;

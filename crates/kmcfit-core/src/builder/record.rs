@@ -1,7 +1,8 @@
 //! Specification of one record: initial state, input and channels.
 
-use super::{BuildError, CoefficientSpec};
+use super::BuildError;
 use crate::functions::{CoefficientKind, Prior};
+use crate::model::CoefficientSpec;
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
 use crate::number_format::significant;
 use crate::record::{

@@ -70,7 +70,8 @@ impl Bands {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     /// The interval is that of the gradient by central differences of `k(T)/k(0) - 1` in the parameters.
     #[test]

@@ -3,13 +3,12 @@
 
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
-use kmcfit_core::internals::builder::{
-    Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec, SensorSpec,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record, ScalarSpec, SensorSpec};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::model::CoefficientSpec;
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 400;

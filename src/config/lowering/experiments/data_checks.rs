@@ -244,7 +244,7 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     let stated = match (file.spec.functions.get(CoefficientKind::MASS)?.fixed).as_ref()? {
         KnownValue::Number(number) => *number,
         KnownValue::Map(map) => map.value?,
-        KnownValue::Unknown(_) => return None,
+        KnownValue::Unknown(_) | KnownValue::History(_) => return None,
     };
     let channel = record.channels.first()?;
     let spacing = channel.spacing?;
