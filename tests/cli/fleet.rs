@@ -76,7 +76,14 @@ fn each_record_has_the_estimates_of_its_own_fit() {
         let keys: Vec<&String> = row.as_object().expect("a map").keys().collect();
         assert_eq!(
             keys,
-            ["record", "sha256", "estimates", "verdict", "warnings", "error"]
+            [
+                "record",
+                "sha256",
+                "estimates",
+                "verdict",
+                "warnings",
+                "error"
+            ]
         );
         let data = format!("experiments.0.data={name}");
         bench.run(&[
