@@ -10,7 +10,7 @@ use kmcfit_core::model::{
     Shared,
 };
 use kmcfit_core::model::{
-    Bound, ColumnId, KnotSpec, KnownValue, Nodes, NumberOrColumn, NumberOrEstimate, SigmaValue,
+    Bound, ColumnId, KnotSpec, KnownValue, Nodes, NumberOrColumn, ScalarSpec, SigmaValue,
     StartSpec, WeightChoice,
 };
 use kmcfit_core::{CoefficientKind, GradientKind, Method};
@@ -256,7 +256,7 @@ fn known(initial: &InitialSpec) -> [f64; 2] {
         panic!("a state")
     };
     [&state.displacement, &state.velocity].map(|value| match value {
-        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => *number,
+        ScalarSpec::Known(number) => *number,
         other => panic!("{other:?}"),
     })
 }

@@ -2,13 +2,13 @@
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::tables::Table;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record, ScalarSpec};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel};
 use kmcfit_core::internals::system::Method;
-use kmcfit_core::model::{BasisName, CoefficientSpec, KnotSpec, StartSpec};
+use kmcfit_core::model::{BasisName, CoefficientSpec, KnotSpec, ScalarSpec, StartSpec};
 use std::path::Path;
 
 /// The columns of a file in `data/`.

@@ -15,8 +15,8 @@ pub mod assessment {
 }
 pub mod builder {
     pub use crate::builder::{
-        BuildError, BuildNotice, Builder, ChannelSpec, Contradiction, Record, ScalarSpec,
-        SensorSpec, UNKNOWN_MASS, WeightSearch, listed,
+        BuildError, BuildNotice, Builder, ChannelSpec, Contradiction, Record, UNKNOWN_MASS,
+        WeightSearch, listed,
     };
 }
 pub mod constraints {

@@ -87,7 +87,7 @@ mod threads;
 // The public API, by topic. `tests/api.rs` holds it to `api.txt`: it grows only on purpose.
 
 // Problems.
-pub use builder::{BuildError, Builder, ChannelSpec, Record, ScalarSpec, SensorSpec};
+pub use builder::{BuildError, Builder, ChannelSpec, Record};
 pub use constraints::{Constraint, Shape, TimeHistory};
 pub use functions::{CoefficientKind, Prior, WeightRule};
 pub use problem::{Problem, ProblemError};

@@ -51,7 +51,7 @@ pub use constraints::listed;
 pub use error::{BuildError, Contradiction};
 pub use notice::BuildNotice;
 pub use penalties::WeightSearch;
-pub use record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
+pub use record::{ChannelSpec, Record};
 
 use crate::constraints::Constraint;
 use crate::functions::{CoefficientKind, ScalarParameter};

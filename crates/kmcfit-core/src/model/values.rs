@@ -145,17 +145,6 @@ impl fmt::Display for ColumnId {
     }
 }
 
-/// A number, or the word `estimate`.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(untagged)]
-#[schemars(inline)]
-pub enum NumberOrEstimate {
-    /// Given.
-    Number(f64),
-    /// Estimated with the functions.
-    Estimate(EstimateWord),
-}
-
 /// Standard deviation of the samples: a number, a column of the file, or the word `estimate`.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
