@@ -420,7 +420,7 @@ fn expected(kind: ValueType) -> String {
         ValueType::Count => "an integer, 0 or more".into(),
         ValueType::Text => "text".into(),
         ValueType::Bool => "true or false".into(),
-        ValueType::Column => "the name of a column, or its number from 1".into(),
+        ValueType::Column => "the name or the number of a column".into(),
         ValueType::Word(word) => format!("`{word}`"),
         ValueType::Choice(words) => one_of(words.iter().map(|(name, _)| *name)),
         ValueType::Map(group) => group.expecting.into(),
@@ -431,7 +431,11 @@ fn expected(kind: ValueType) -> String {
             match is_both {
                 true => format!("{}, or a list of them", expected(kinds[0])),
                 false => {
-                    let all: Vec<String> = kinds.iter().map(|kind| expected(*kind)).collect();
+                    let is_word = |kind: &&ValueType| matches!(kind, ValueType::Word(_));
+                    let words = kinds.iter().filter(is_word);
+                    let others = kinds.iter().filter(|kind| !is_word(kind));
+                    let all: Vec<String> =
+                        others.chain(words).map(|kind| expected(*kind)).collect();
                     let last = all.len() - 1;
                     format!("{}, or {}", all[..last].join(", "), all[last])
                 }

@@ -168,22 +168,22 @@ fn knots() {
     assert_snapshot!(knots("-3"), @"
     m.yaml:5:52: functions.mass.knots: a count cannot be negative
       found: the integer -3
-      expected: the number of equally spaced knots, a list of times in s, or `auto`
+      expected: an integer, 0 or more, a list of numbers, or `auto`
     ");
     assert_snapshot!(knots("eleven"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: text `eleven`
-      expected: the number of equally spaced knots, a list of times in s, or `auto`
+      expected: an integer, 0 or more, a list of numbers, or `auto`
     ");
     assert_snapshot!(knots("2.5"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: the floating-point number 2.5
-      expected: the number of equally spaced knots, a list of times in s, or `auto`
+      expected: an integer, 0 or more, a list of numbers, or `auto`
     ");
     assert_snapshot!(knots("{count: 3}"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: a map
-      expected: the number of equally spaced knots, a list of times in s, or `auto`
+      expected: an integer, 0 or more, a list of numbers, or `auto`
     ");
     assert_snapshot!(knots("[0, 5, 12]"), @"
     m.yaml:5:59: functions.mass.knots[2]: this knot lies outside the record
@@ -315,7 +315,7 @@ fn degrees() {
     assert_snapshot!(message("{basis: polynomial, start: 1, degree: 1.5}"), @"
     m.yaml:5:47: functions.mass.degree: not an integer
       found: the floating-point number 1.5
-      expected: an integer
+      expected: an integer, 0 or more
     ");
     assert_snapshot!(message("{basis: polynomial, start: 1, degree: -1}"), @"
     m.yaml:5:47: functions.mass.degree: a count cannot be negative
@@ -409,9 +409,9 @@ fn limits() {
     ");
     assert_eq!(with("min: none"), "no error");
     assert_snapshot!(with("min: nine"), @"
-    m.yaml:5:39: functions.mass.min: neither a number nor `none`
+    m.yaml:5:39: functions.mass.min: neither a number nor a known word
       found: text `nine`
-      expected: a finite number, `none`, or a column: {data: file.csv, column: name}
+      expected: a finite number, a column: {data: file.csv, column: name}, or `none`
       hint: did you mean `none`?
     ");
     assert_snapshot!(with("max: {data: x.csv, column: m_kg}"), @"

@@ -151,10 +151,7 @@ impl Builder {
     /// Error for a known part that is not known, beside a fixed value, or without the likelihood that its standard deviation needs.
     fn check_known(&self, entries: &[FunctionEntry]) -> Result<(), BuildError> {
         for entry in self.given() {
-            if entry.spec.known_part.is_some()
-                && !entry.spec.is_estimated()
-                && !entry.spec.is_shared()
-            {
+            if entry.spec.known_part.is_some() && entry.spec.fixed.is_some() {
                 let problem = "a fixed function has no known part";
                 return Err(
                     BuildError::new(format!("{}.{KNOWN_PART}", entry.key), problem)
