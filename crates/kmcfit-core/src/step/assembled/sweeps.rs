@@ -114,6 +114,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Response from the state `initial`: the displacements of all coordinates, then their velocities. `states` gives the number of nodes.
+    /// Up to [`Motion::largest_stable_step`] explicit steps let no motion grow that decays; whether they are longer is not tested here.
     ///
     /// # Errors
     /// A [`MotionError`] if the mass matrix is not positive definite, an implicit step is not solved, or the response overflows.
