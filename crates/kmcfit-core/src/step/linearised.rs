@@ -1,6 +1,6 @@
 //! Linearisation of eight steps at once about a known response.
 
-use super::stage::{EightSteps, Model, Pair, Reciprocal, Stage, Stages, eight, increment};
+use super::stage::{EightSteps, Model, Pair, Stage, Stages, eight, increment};
 use super::tableau::Tableau;
 use crate::simd::{Arithmetic, Eight, Real, Row};
 use crate::structure::Link;
@@ -234,13 +234,13 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Stages<Eight
         let (model, out) = (self.model, &mut *self.out);
         let zero = q[0].like(0.0);
         let count = model.elements().len();
-        let stage = Stage::<_, Reciprocal<_>, N, E>::read(&self.values, count, model.tableau.at[s]);
+        let stage = Stage::<_, N, E>::read(&self.values, count, model.tableau.at[s]);
         out.slopes[s] = stage.slopes(model.elements(), q, v);
         stage.matrices(model.elements(), &out.slopes[s], &mut out.matrices[s], zero);
         let (a, phi) = stage.accelerations(model.elements(), q, v);
         out.phi[s] = phi;
         for j in 0..N {
-            out.inverse_masses[s][j] = stage.inertia[j].0;
+            out.inverse_masses[s][j] = stage.inverse_masses[j];
             out.absolute[s][j] = match &stage.drives {
                 Some([_, bases]) => a[j] + bases[j],
                 None => a[j],
