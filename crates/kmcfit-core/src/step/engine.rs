@@ -6,7 +6,7 @@ use super::error::{SimulationError, require_finite, require_positive_masses};
 use super::maps::{Linearise, StepMaps, Wanted};
 use super::paper;
 use super::response::{Linear, Prepared};
-use super::stage::{DUFFING, Drive, LINEAR, Model};
+use super::stage::{DUFFING, Drive, Elements, LINEAR, Model};
 use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{CoefficientGradient, Trajectory};
 use crate::simd;
@@ -29,12 +29,12 @@ pub enum EngineMode {
 pub(crate) type Maps = StepMaps<2, FUNCTIONS>;
 
 /// Largest number of nodes of a free linear record that is computed in the paper's order: gradient descent depends on every bit.
-const SHORTEST: usize = 64;
+const MOST_IN_PAPER_ORDER: usize = 64;
 
 impl EngineMode {
     fn is_in_paper_order(self, driven: Driven, nodes: usize) -> bool {
         let is_free = || driven.excitation.is_none_or(Excitation::is_zero);
-        let is_wanted = self == Self::Reference || nodes <= SHORTEST && is_free();
+        let is_wanted = self == Self::Reference || nodes <= MOST_IN_PAPER_ORDER && is_free();
         is_wanted && is_linear_midpoint(driven.system) && driven.nodal.coefficients.len() == 2
     }
 }
@@ -149,7 +149,7 @@ impl<'a> Driven<'a> {
     fn model<'b, const E: usize, const S: usize>(
         self,
         tableau: &'b Tableau<S>,
-        list: &'b [Link],
+        links: &'b [Link],
     ) -> Model<'b, 1, E, S>
     where
         'a: 'b,
@@ -161,7 +161,7 @@ impl<'a> Driven<'a> {
             .filter(|e| !e.forces.is_empty() || !e.frames.is_empty());
         Model {
             tableau,
-            list,
+            elements: Elements::new(links),
             masses: [&self.nodal.inertias[0]],
             coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
             drives: driven.map(|e| {
@@ -353,11 +353,12 @@ pub(crate) fn least_squares(
 ) -> Option<f64> {
     let [mass, damping, stiffness] = functions;
     let nodes = observed.len();
-    let usable = is_linear_midpoint(system) && nodes > SHORTEST && simd::sum::are_positive(mass);
+    let usable =
+        is_linear_midpoint(system) && nodes > MOST_IN_PAPER_ORDER && simd::sum::are_positive(mass);
     usable.then_some(())?;
     let model = Model::<1, 2, 2> {
         tableau: &MIDPOINT,
-        list: LINEAR,
+        elements: Elements::new(LINEAR),
         masses: [mass],
         coefficients: [damping, stiffness],
         drives: None,

@@ -138,7 +138,7 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Linearised<E
                 x[k][j] = eight(arithmetic, states[k][j], from);
             }
         }
-        let mut stages = AtStages {
+        let mut stages = LinearisedStages {
             model,
             values: EightSteps(arithmetic, model, from),
             out: self,
@@ -220,14 +220,14 @@ pub(super) struct Transposed<T, const N: usize, const E: usize> {
     pub bases: [Shares<T>; N],
 }
 
-struct AtStages<'a, 'm, A: Arithmetic, const N: usize, const E: usize, const S: usize> {
+struct LinearisedStages<'a, 'm, A: Arithmetic, const N: usize, const E: usize, const S: usize> {
     model: Model<'m, N, E, S>,
     values: EightSteps<'m, A, N, E, S>,
     out: &'a mut Linearised<Eight<A>, N, E, S>,
 }
 
 impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Stages<Eight<A>, N>
-    for AtStages<'_, '_, A, N, E, S>
+    for LinearisedStages<'_, '_, A, N, E, S>
 {
     #[inline(always)]
     fn accelerations(&mut self, s: usize, q: &[Eight<A>; N], v: &[Eight<A>; N]) -> [Eight<A>; N] {

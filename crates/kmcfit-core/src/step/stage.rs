@@ -21,8 +21,7 @@ pub(crate) struct Drive<'a> {
 #[derive(Clone, Copy)]
 pub(crate) struct Model<'a, const N: usize, const E: usize, const S: usize> {
     pub tableau: &'a Tableau<S>,
-    /// See [`Model::elements`].
-    pub list: &'a [Link],
+    pub elements: Elements<'a, N, E>,
     /// Nodal values.
     pub masses: [&'a [f64]; N],
     /// Nodal values; empty for zero.
@@ -42,15 +41,33 @@ pub(crate) const DUFFING: &[Link] = &[
     Link::grounded(Law::CubicStiffness),
 ];
 
+/// Up to `E` elements of `N` coordinates. Two and three of one coordinate are [`LINEAR`] and [`DUFFING`], known to the compiler, which unrolls
+/// their loops.
+#[derive(Clone, Copy)]
+pub(crate) struct Elements<'a, const N: usize, const E: usize>(&'a [Link]);
+
+impl<'a, const N: usize, const E: usize> Elements<'a, N, E> {
+    const KNOWN: Option<&'static [Link]> = match (N, E) {
+        (1, 2) => Some(LINEAR),
+        (1, 3) => Some(DUFFING),
+        _ => None,
+    };
+
+    /// # Panics
+    /// If there are more than `E`, or others than the known ones.
+    pub fn new(list: &'a [Link]) -> Self {
+        let is_known = Self::KNOWN.is_none_or(|known| known == list);
+        assert!(is_known && list.len() <= E, "a list of its own");
+        Self(list)
+    }
+}
+
 impl<'a, const N: usize, const E: usize, const S: usize> Model<'a, N, E, S> {
-    /// The elements. Two and three of one coordinate are [`LINEAR`] and [`DUFFING`], known to the compiler, which unrolls their loops; any
-    /// other list has room for [`MOST_ELEMENTS`](crate::structure::MOST_ELEMENTS).
     #[inline(always)]
     pub fn elements(&self) -> &'a [Link] {
-        match (N, E) {
-            (1, 2) => LINEAR,
-            (1, 3) => DUFFING,
-            _ => self.list,
+        match Elements::<N, E>::KNOWN {
+            Some(known) => known,
+            None => self.elements.0,
         }
     }
 

@@ -3,7 +3,7 @@
 use super::adjoint::{Adjoint, Gradient};
 use super::maps::{Linearise, StepMaps, Wanted};
 use super::response::{Linear, Prepared};
-use super::stage::{Drive, Function, Model, Values, step};
+use super::stage::{Drive, Elements, Function, Model, Values, step};
 use super::tableau::{At, MIDPOINT, RK4, Tableau};
 use crate::simd::{self, Arithmetic, Kernel, LANES, Real};
 use crate::structure::{CoefficientKind, Law, Link};
@@ -98,7 +98,7 @@ impl<const N: usize> Structure<N> {
         let stages = |of: &'a [Vec<f64>; 3]| Some(of.each_ref().map(Vec::as_slice));
         Model {
             tableau,
-            list: &self.elements,
+            elements: Elements::new(&self.elements),
             masses: from_fn(|j| self.functions[j].as_slice()),
             coefficients: from_fn(|e| self.functions.get(N + e).map_or(&[][..], |p| p)),
             drives: self.inputs.as_ref().map(|inputs| {
@@ -423,7 +423,7 @@ fn two_modes_converge_with_the_order_of_the_method() {
             ($tableau:expr) => {{
                 let model = Model::<2, ELEMENTS, _> {
                     tableau: $tableau,
-                    list: &list,
+                    elements: Elements::new(&list),
                     masses: [&one, &one],
                     coefficients: from_fn(|e| if e < 3 { &four[..] } else { &[] }),
                     drives: None,
