@@ -12,13 +12,14 @@ use crate::config::ModelFile;
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory::MOST_NODES_TIMES_PARAMETERS;
+use crate::number_format::significant;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::system::{Grid, Method};
 use kmcfit_core::model::{BasisName, FitMethod};
 use kmcfit_core::model::{KnotSpec, Nodes};
 
 /// Most nodes of an automatic choice: the same on every machine.
-const MOST_CHOSEN: usize = 10_000_000;
+pub(super) const MOST_CHOSEN: usize = 10_000_000;
 
 /// The grid, and the numbers of nodes for finer ones where it is automatic.
 #[derive(Debug, Clone, Copy)]
@@ -97,6 +98,23 @@ fn about_nodes(file: &ModelFile, mode: BuildMode, problem: &str) -> InputError {
         Some(_) => InputError::new(Location::Argument("--nodes".into()), problem),
         None => file.error_at("grid.nodes", problem),
     }
+}
+
+/// Error about steps that let the response at the start grow, where `least` nodes have stable ones.
+pub(super) fn unstable_steps(
+    file: &ModelFile,
+    mode: BuildMode,
+    grid: &Grid,
+    least: usize,
+) -> InputError {
+    let problem = "the steps are unstable at the start values of the functions";
+    let (nodes, step) = (grid.nodes(), significant(grid.step(), 3));
+    let error = about_nodes(file, mode, problem).found(format!("{nodes} nodes, steps of {step} s"));
+    let error = error.expected(format!("at least {least} nodes"));
+    error.hint(match mode {
+        BuildMode::Fit => "or start values of a slower motion; `nodes: auto` chooses stable steps",
+        BuildMode::Simulate { .. } => "a response to these steps grows, whatever the system does",
+    })
 }
 
 /// Refuses a grid with too many nodes for the parameters of the functions.

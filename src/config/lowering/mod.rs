@@ -234,7 +234,7 @@ struct Known {
 /// At the first invalid key, with its line.
 pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
     let model = build_on(file, mode, 0, None)?;
-    Ok(model.on_stable_grid())
+    model.on_stable_grid(file, mode)
 }
 
 /// [`build()`] with at least `least` nodes of an automatic grid; what is known from another grid is not read and estimated again.

@@ -1,9 +1,11 @@
 //! Finer grids of a model whose number of nodes is automatic.
 
-use super::grid::{FinerNodes, stable_nodes};
+use super::grid::{FinerNodes, MOST_CHOSEN, stable_nodes, unstable_steps};
 use super::{BuildMode, Known, Model, ReadRecords, build_on};
 use crate::config::ModelFile;
+use crate::error::InputError;
 use kmcfit_core::internals::solvers::Solver;
+use kmcfit_core::internals::system::NodalCoefficients;
 use std::sync::Arc;
 
 /// An automatic grid, and the model file from which the model is built on a finer one.
@@ -60,26 +62,45 @@ impl Model {
     }
 
     /// The model on a grid with stable steps at the start, if its grid is automatic and such a grid is possible.
-    pub(super) fn on_stable_grid(self) -> Self {
-        let Some(most) = self.grid.as_ref().map(AutomaticGrid::most) else {
-            return self;
-        };
+    ///
+    /// # Errors
+    /// If the steps are unstable at the start on a grid that is not finer.
+    pub(super) fn on_stable_grid(
+        mut self,
+        file: &ModelFile,
+        mode: BuildMode,
+    ) -> Result<Self, InputError> {
+        if let Some(most) = self.grid.as_ref().map(AutomaticGrid::most) {
+            let stable = self.stable_nodes(|_| true).min(most);
+            let before = self.problem.system.grid.nodes();
+            let finer = (stable > before).then(|| self.on_nodes(stable)).flatten();
+            if let Some(mut finer) = finer {
+                let nodes = finer.problem.system.grid.nodes();
+                finer.automatic.push(stable_nodes(nodes, before));
+                self = finer;
+            }
+        }
+        let system = &self.problem.system;
+        // The equation error needs no response.
+        let simulates = mode != BuildMode::Fit || self.settings.solver != Solver::EquationError;
+        let least = self.stable_nodes(|nodal| simulates && system.is_unstable(nodal));
+        // Start values without any stable grid fail at the first step.
+        match least == 0 || least > MOST_CHOSEN {
+            true => Ok(self),
+            false => Err(unstable_steps(file, mode, &system.grid, least)),
+        }
+    }
+
+    /// Smallest number of nodes with stable steps for all start functions that are meant; 0 without them.
+    fn stable_nodes(&self, is_meant: impl Fn(&NodalCoefficients) -> bool) -> usize {
         let problem = &self.problem;
         let start = problem.start();
-        let sets = 0..problem.functions.coefficient_sets().len();
-        let of_set = sets.map(|set| {
+        let of_set = |set: usize| {
             let mut nodal = problem.functions.empty_nodal();
             problem.functions.nodal_into(&start, set, &mut nodal);
-            problem.system.stable_nodes(&nodal)
-        });
-        let stable = of_set.max().unwrap_or_default().min(most);
-        let before = problem.system.grid.nodes();
-        let finer = (stable > before).then(|| self.on_nodes(stable)).flatten();
-        let Some(mut finer) = finer else {
-            return self;
+            is_meant(&nodal).then(|| problem.system.stable_nodes(&nodal))
         };
-        let nodes = finer.problem.system.grid.nodes();
-        finer.automatic.push(stable_nodes(nodes, before));
-        finer
+        let sets = 0..problem.functions.coefficient_sets().len();
+        sets.filter_map(of_set).max().unwrap_or_default()
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Each subproblem is a least-squares problem in residual form with linear and second-order-cone constraints ([`Subproblem`]).
 //! [`Subproblem::solve_equality_constrained`] solves it with its equalities only, by one elimination or one sparse factorisation;
-//! [`Subproblem::solve`] the full problem: by an interior point along time, in few variables by active sets, otherwise by Clarabel.
+//! [`Subproblem::solve`] the full problem: by an interior point along time, in few variables by active sets, otherwise by Clarabel, which
+//! [`Subproblem::solve_by_clarabel`] uses alone.
 
 mod chain;
 mod clarabel;
@@ -26,7 +27,7 @@ pub use chain::BandedFactor;
 pub use kkt::Kkt;
 pub use layout::{ResponseVariables, StageLayout};
 pub use primal_dual::PrimalDual;
-pub use projection::{project, project_within};
+pub use projection::{project, project_by};
 pub use solve::{ConicStatus, Solution};
 
 pub use subproblem::Subproblem;

@@ -72,22 +72,22 @@ pub struct Projection {
 /// Projects `theta` onto the constraints in the diagonal metric `metric`:
 /// minimises `sum_j metric_j (theta'_j - theta_j)^2`.
 pub fn project(constraints: &Constraints, theta: &[f64], metric: &[f64]) -> Projection {
-    project_within(Subproblem::ITERATIONS, constraints, theta, metric, None)
+    project_by(constraints, theta, metric, None, Subproblem::solve)
 }
 
-/// [`project`] with an iteration limit of the quadratic program, and the parameters in time where they are known.
-pub fn project_within(
-    iterations: u32,
+/// [`project`] by a solver of the quadratic program, with the parameters in time where they are known.
+pub fn project_by(
     constraints: &Constraints,
     theta: &[f64],
     metric: &[f64],
     layout: Option<StageLayout>,
+    solve: impl FnOnce(&Subproblem) -> Solution,
 ) -> Projection {
     let mut sub = Subproblem::new(theta.len());
     sub.layout = layout;
     sub.proximal.copy_from_slice(metric);
     let places = sub.constrain(constraints, theta);
-    let solution = sub.solve_within(iterations);
+    let solution = solve(&sub);
     Projection {
         status: solution.status,
         theta: constraints.moved(theta, &solution.z),

@@ -128,66 +128,95 @@ impl Subproblem {
 
     /// [`Subproblem::solve`] with at most `iterations` iterations per attempt; with zero iterations the program is stalled.
     ///
-    /// In few variables the minimum is first looked for by active sets, without the interior-point solver.
+    /// Along time by the interior-point method on stages, in few variables by active sets, otherwise by Clarabel.
     ///
-    /// The status of the interior-point solver is not used: its point is polished on its active set and accepted by its residuals, its proof of
+    /// The status of Clarabel is not used: its point is polished on its active set and accepted by its residuals, its proof of
     /// infeasibility is checked. A rejected result is followed by an attempt with other settings.
     pub fn solve_within(&self, iterations: u32) -> Solution {
         self.solve_until(iterations, Kkt::is_solution, true)
     }
 
+    /// [`Subproblem::solve_within`] by Clarabel alone: the reference for all programs.
+    pub fn solve_by_clarabel(&self, iterations: u32) -> Solution {
+        (self.at_once(iterations).or_else(|| self.at_zero()))
+            .unwrap_or_else(|| self.by_clarabel(iterations, Kkt::is_solution, true))
+    }
+
     /// A step of a fit on the stages of [`Subproblem::layout`]: a point that satisfies the constraints and brings the cost down
     /// to the minimum but for [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed
     /// the minimum, zero for the minimum itself. `None` where there is none.
-    pub fn step_on_stages(&self, iterations: u32) -> Option<(Solution, f64)> {
+    pub fn step_on_stages(&self, iterations: u32) -> Option<(Vec<f64>, f64)> {
         let is_usable = iterations > 0 && self.layout.is_some() && self.is_finite();
         is_usable.then_some(())?;
         let found = self.minimise_on_stages(iterations, Self::STEP_GAP)?;
         let excess = 2.0 * (found.gap + found.decrease);
         if excess <= 4.0 * Self::STEP_GAP * found.fall {
-            return Some((self.unjudged(found.point), excess));
+            return Some((found.point.z, excess));
         }
         let kkt = self.kkt_with_decrease(&found.point, found.decrease);
-        let found = kkt.is_solution().then_some(Some((found.point, kkt)))?;
-        Some((self.solution(ConicStatus::Solved, found, 1), 0.0))
+        kkt.is_solution().then_some((found.point.z, 0.0))
     }
 
     /// Largest excess of the cost of a step over the minimum, as a share of the decrease; the next linearisation removes it.
     const STEP_GAP: f64 = 5e-3;
 
-    /// Attempts until the residuals of a point are within limits; without such a point, with `seeks_proof` a proof of infeasibility.
+    /// On stages, at zero, in few variables, and then by Clarabel, until the residuals of a point are within limits.
     fn solve_until(
         &self,
         iterations: u32,
         is_enough: impl Fn(&Kkt) -> bool,
         seeks_proof: bool,
     ) -> Solution {
+        (self.at_once(iterations))
+            .or_else(|| self.on_stages(iterations))
+            .or_else(|| self.at_zero())
+            .or_else(|| self.in_few_variables())
+            .unwrap_or_else(|| self.by_clarabel(iterations, is_enough, seeks_proof))
+    }
+
+    /// The end of a program that no solver takes.
+    fn at_once(&self, iterations: u32) -> Option<Solution> {
         if iterations == 0 || !self.is_finite() {
-            return self.refused(None, 0);
+            return Some(self.refused(None, 0));
         }
-        if self.has_impossible_row() {
-            return self.solution(ConicStatus::Infeasible, None, 0);
-        }
-        if let Some(found) = self.minimise_on_stages(iterations, 0.0) {
-            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
-            if kkt.is_solution() {
-                return self.solution(ConicStatus::Solved, Some((found.point, kkt)), 1);
-            }
-        }
-        // With zero cost at zero, the interior-point method has no unit of the cost.
+        let infeasible = || self.solution(ConicStatus::Infeasible, None, 0);
+        self.has_impossible_row().then(infeasible)
+    }
+
+    fn on_stages(&self, iterations: u32) -> Option<Solution> {
+        let found = self.minimise_on_stages(iterations, 0.0)?;
+        let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+        self.judged(found.point, kkt, 1)
+    }
+
+    /// Zero, where it is the minimum: with zero cost there, the interior-point method has no unit of the cost.
+    fn at_zero(&self) -> Option<Solution> {
         let zero = PrimalDual::zero(self);
         let kkt = self.kkt(&zero);
-        if kkt.is_solution() {
-            return self.solution(ConicStatus::Solved, Some((zero, kkt)), 0);
-        }
-        let mut normalised = None;
+        self.judged(zero, kkt, 0)
+    }
+
+    fn in_few_variables(&self) -> Option<Solution> {
         let few = self.minimum_in_few_variables();
-        if let Some((point, kkt)) = few.or_else(|| self.minimum_from_zero()) {
-            let normalised = normalised.get_or_insert_with(|| ScaledProgram::new(self));
-            if normalised.resolves(&point.z) {
-                return self.solution(ConicStatus::Solved, Some((point, kkt)), 0);
-            }
-        }
+        let (point, kkt) = few.or_else(|| self.minimum_from_zero())?;
+        let is_resolved = ScaledProgram::new(self).resolves(&point.z);
+        is_resolved.then(|| self.solution(ConicStatus::Solved, Some((point, kkt)), 0))
+    }
+
+    /// The solution, if its residuals are those of one.
+    fn judged(&self, point: PrimalDual, kkt: Kkt, attempts: u32) -> Option<Solution> {
+        let solved = || self.solution(ConicStatus::Solved, Some((point, kkt)), attempts);
+        kkt.is_solution().then(solved)
+    }
+
+    /// Attempts until the residuals of a point are within limits; without such a point, with `seeks_proof` a proof of infeasibility.
+    fn by_clarabel(
+        &self,
+        iterations: u32,
+        is_enough: impl Fn(&Kkt) -> bool,
+        seeks_proof: bool,
+    ) -> Solution {
+        let mut normalised = None;
         let mut best: Option<(PrimalDual, Kkt)> = None;
         for (attempts, attempt) in (1..).zip(ATTEMPTS) {
             let settings = Settings {
@@ -272,19 +301,6 @@ impl Subproblem {
             z: candidate.z,
             kkt,
             attempts,
-        }
-    }
-
-    /// A point whose cost is known to be near enough to the minimum.
-    fn unjudged(&self, point: PrimalDual) -> Solution {
-        Solution {
-            status: ConicStatus::Solved,
-            multipliers: point.inequalities,
-            equality_multipliers: point.equalities,
-            cone_multipliers: point.cones.iter().map(|cone| cone[0]).collect(),
-            z: point.z,
-            kkt: None,
-            attempts: 1,
         }
     }
 

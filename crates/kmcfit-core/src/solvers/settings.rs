@@ -101,11 +101,11 @@ impl StartStrategy {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum QpSolver {
-    /// Clipping and eliminations where they give the step; along time an interior-point method on stages; Clarabel
-    /// otherwise.
+    /// Clipping and eliminations where they give the step; along time an interior-point method on stages; in few variables active sets;
+    /// Clarabel otherwise.
     #[default]
     Auto,
-    /// Clarabel for every step of Gauss–Newton and of the projected gradient under constraints.
+    /// Clarabel alone for every step of Gauss–Newton and of the projected gradient under constraints or with jumps.
     Clarabel,
 }
 

@@ -3,7 +3,7 @@
 use super::infeasible_subset::{conflict, feasibility};
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, StageLayout, Subproblem, project, project_within};
+use crate::qp::{ConicStatus, StageLayout, Subproblem, project, project_by};
 
 /// Smallest positive mass, as a share of the start's largest: a lighter system oscillates a thousand times faster than the
 /// start, which a grid suitable for the start does not resolve.
@@ -85,8 +85,8 @@ impl Problem {
             &vec![1.0; start.len()],
         ] {
             let layout = StageLayout::of(&self.functions);
-            let iterations = Subproblem::ITERATIONS;
-            let projection = project_within(iterations, &self.constraints, start, metric, layout);
+            let (constraints, solve) = (&self.constraints, Subproblem::solve);
+            let projection = project_by(constraints, start, metric, layout, solve);
             if self.constraints.hold(&projection.theta, TOLERANCE) {
                 return Ok(projection.theta);
             }

@@ -49,9 +49,10 @@ impl<const N: usize, const E: usize, const S: usize> Kernel for Adjoint<'_, N, E
         let mut to = last;
         while to > 0 {
             let from = (to - 1) / LANES * LANES;
-            linearised.set(arithmetic, model, &states, from);
+            let is_known = to < last && is_linear && model.is_constant(from);
+            linearised.set(arithmetic, model, &states, from, is_known);
             let (tableau, dt) = (model.tableau, model.dt);
-            if to == last || !is_linear || !model.is_constant(from) {
+            if !is_known {
                 step_matrices(tableau, dt, &linearised.matrices, &mut matrices, zero);
             }
             if to - from < LANES {

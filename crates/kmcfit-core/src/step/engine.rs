@@ -4,8 +4,9 @@
 use super::adjoint::{Adjoint, Gradient};
 use super::error::{SimulationError, require_finite, require_positive_masses};
 use super::maps::{Linearise, StepMaps, Wanted};
-use super::response::{Linear, Prepared, in_paper_order};
-use super::stage::{DUFFING, Drive, LINEAR, Model};
+use super::paper;
+use super::response::{Linear, Prepared};
+use super::stage::{DUFFING, Drive, Elements, LINEAR, Model};
 use super::tableau::{MIDPOINT, RK4, Tableau};
 use super::{CoefficientGradient, Trajectory};
 use crate::simd;
@@ -14,7 +15,8 @@ use crate::system::{
     Excitation, FUNCTIONS, Method, NodalCoefficients, StageSamples, State, System, SystemTangent,
 };
 
-/// Required agreement of a response with the paper's order of operations.
+/// Required agreement of a response with the paper's order of operations, where the system is the paper's: one coordinate with damping and
+/// stiffness by the midpoint rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EngineMode {
     /// Every bit. The history of the paper's run depends on every bit.
@@ -27,16 +29,13 @@ pub enum EngineMode {
 pub(crate) type Maps = StepMaps<2, FUNCTIONS>;
 
 /// Largest number of nodes of a free linear record that is computed in the paper's order: gradient descent depends on every bit.
-const SHORTEST: usize = 64;
+const MOST_IN_PAPER_ORDER: usize = 64;
 
 impl EngineMode {
-    fn is_in_paper_order(
-        self,
-        system: &System,
-        excitation: Option<&Excitation>,
-        nodes: usize,
-    ) -> bool {
-        self == Self::Reference || nodes <= SHORTEST && system.is_linear_and_free(excitation)
+    fn is_in_paper_order(self, driven: Driven, nodes: usize) -> bool {
+        let is_free = || driven.excitation.is_none_or(Excitation::is_zero);
+        let is_wanted = self == Self::Reference || nodes <= MOST_IN_PAPER_ORDER && is_free();
+        is_wanted && is_linear_midpoint(driven.system) && driven.nodal.coefficients.len() == 2
     }
 }
 
@@ -67,27 +66,17 @@ macro_rules! with_model {
     }};
 }
 
-/// How a response is computed.
-#[derive(Clone, Copy)]
-enum Order {
-    Paper,
-    Linear,
-    Nonlinear,
-}
-
 /// Response of one coordinate.
 fn respond_in<const E: usize, const S: usize>(
     model: Model<1, E, S>,
     initial: &State,
     trajectory: &mut Trajectory,
-    order: Order,
 ) {
     let x = [[initial.displacement(0)], [initial.velocity(0)]];
     let states = trajectory.columns_mut();
-    match order {
-        Order::Paper => in_paper_order(model, x, states),
-        Order::Linear => simd::run(Linear { model, x, states }),
-        Order::Nonlinear => simd::run(Prepared { model, x, states }),
+    match model.elements().iter().all(|e| e.law.is_linear()) {
+        true => simd::run(Linear { model, x, states }),
+        false => simd::run(Prepared { model, x, states }),
     }
 }
 
@@ -160,7 +149,7 @@ impl<'a> Driven<'a> {
     fn model<'b, const E: usize, const S: usize>(
         self,
         tableau: &'b Tableau<S>,
-        list: &'b [Link],
+        links: &'b [Link],
     ) -> Model<'b, 1, E, S>
     where
         'a: 'b,
@@ -172,7 +161,7 @@ impl<'a> Driven<'a> {
             .filter(|e| !e.forces.is_empty() || !e.frames.is_empty());
         Model {
             tableau,
-            list,
+            elements: Elements::new(links),
             masses: [&self.nodal.inertias[0]],
             coefficients: std::array::from_fn(|e| coefficients.get(e).map_or(&[][..], |p| p)),
             drives: driven.map(|e| {
@@ -213,12 +202,10 @@ impl<'a> Driven<'a> {
             return driven.respond_assembled(initial, trajectory);
         };
         require_positive_masses(grid, self.nodal)?;
-        let order = match self.system.structure.is_linear() {
-            _ if mode.is_in_paper_order(self.system, self.excitation, nodes) => Order::Paper,
-            true => Order::Linear,
-            false => Order::Nonlinear,
-        };
-        with_model!(driven, links, respond_in(initial, trajectory, order));
+        match mode.is_in_paper_order(driven, nodes) {
+            true => paper::respond(driven, initial, trajectory),
+            false => with_model!(driven, links, respond_in(initial, trajectory)),
+        }
         require_finite(grid, trajectory)
     }
 
@@ -366,11 +353,12 @@ pub(crate) fn least_squares(
 ) -> Option<f64> {
     let [mass, damping, stiffness] = functions;
     let nodes = observed.len();
-    let usable = is_linear_midpoint(system) && nodes > SHORTEST && simd::sum::are_positive(mass);
+    let usable =
+        is_linear_midpoint(system) && nodes > MOST_IN_PAPER_ORDER && simd::sum::are_positive(mass);
     usable.then_some(())?;
     let model = Model::<1, 2, 2> {
         tableau: &MIDPOINT,
-        list: LINEAR,
+        elements: Elements::new(LINEAR),
         masses: [mass],
         coefficients: [damping, stiffness],
         drives: None,

@@ -25,7 +25,7 @@ pub enum Cause {
 pub struct SimulationError {
     /// Cause.
     pub cause: Cause,
-    /// Node of the failure.
+    /// The first node at which the response or the mass fails; of a step without a solution the node at its left end.
     pub node: usize,
     /// Time of the node, s.
     pub time: f64,
@@ -71,12 +71,9 @@ pub(super) fn require_positive_masses(
 
 /// Error if the response is not finite.
 pub(super) fn require_finite(grid: &Grid, trajectory: &Trajectory) -> Result<(), SimulationError> {
-    if trajectory.is_finite() {
+    let Some(node) = trajectory.first_not_finite() else {
         return Ok(());
-    }
-    let node = (0..trajectory.nodes())
-        .find(|&i| !trajectory.is_finite_at(i))
-        .unwrap_or(0);
+    };
     let last = trajectory.displacement(0)[node.saturating_sub(1)];
     Err(at(grid, Cause::Overflow, node, last))
 }

@@ -1,6 +1,6 @@
 //! Linearisation of eight steps at once about a known response.
 
-use super::stage::{EightSteps, Model, Pair, Reciprocal, Stage, Stages, eight, increment};
+use super::stage::{EightSteps, Model, Pair, Stage, Stages, Values, eight, increment};
 use super::tableau::Tableau;
 use crate::simd::{Arithmetic, Eight, Real, Row};
 use crate::structure::Link;
@@ -99,7 +99,7 @@ pub(super) struct Linearised<T, const N: usize, const E: usize, const S: usize> 
     slopes: [[[Option<T>; 2]; E]; S],
     /// Derivatives of the accelerations with respect to displacements and velocities.
     pub matrices: [[[[T; N]; N]; 2]; S],
-    inverse_masses: [[T; N]; S],
+    stages: [Stage<T, N, E>; S],
     /// Absolute accelerations.
     absolute: [[T; N]; S],
     phi: [[T; E]; S],
@@ -113,17 +113,22 @@ pub(super) type Shares<T> = [T; 3];
 impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Linearised<Eight<A>, N, E, S> {
     #[inline(always)]
     pub fn nothing(zero: Eight<A>) -> Self {
+        let stage = Stage {
+            inverse_masses: [zero; N],
+            p: [zero; E],
+            drives: None,
+        };
         Linearised {
             slopes: [[[None; 2]; E]; S],
             matrices: [[[[zero; N]; N]; 2]; S],
-            inverse_masses: [[zero; N]; S],
+            stages: [stage; S],
             absolute: [[zero; N]; S],
             phi: [[zero; E]; S],
             increment: [[zero; N]; 2],
         }
     }
 
-    /// Linearises the steps from `from` about `states`.
+    /// Linearises the steps from `from` about `states`; `is_known` for a linear structure with the functions of the steps linearised before.
     #[inline(always)]
     pub fn set(
         &mut self,
@@ -131,6 +136,7 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Linearised<E
         model: Model<N, E, S>,
         states: &[[&[f64]; N]; 2],
         from: usize,
+        is_known: bool,
     ) {
         let mut x = [[Eight::splat(arithmetic, 0.0); N]; 2];
         for k in 0..2 {
@@ -138,10 +144,11 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Linearised<E
                 x[k][j] = eight(arithmetic, states[k][j], from);
             }
         }
-        let mut stages = AtStages {
+        let mut stages = LinearisedStages {
             model,
             values: EightSteps(arithmetic, model, from),
             out: self,
+            is_known,
         };
         self.increment = increment(model.tableau, model.dt, &x, &mut stages);
     }
@@ -173,7 +180,7 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Linearised<E
             let mut w = [zero; N];
             let at = model.tableau.at[s] as usize;
             for j in 0..N {
-                w[j] = by[1][j] * self.inverse_masses[s][j];
+                w[j] = by[1][j] * self.stages[s].inverse_masses[j];
                 out.masses[j][at] = out.masses[j][at] - w[j] * self.absolute[s][j];
                 out.forces[j][at] += w[j];
                 out.bases[j][at] = out.bases[j][at] - by[1][j];
@@ -220,27 +227,32 @@ pub(super) struct Transposed<T, const N: usize, const E: usize> {
     pub bases: [Shares<T>; N],
 }
 
-struct AtStages<'a, 'm, A: Arithmetic, const N: usize, const E: usize, const S: usize> {
+struct LinearisedStages<'a, 'm, A: Arithmetic, const N: usize, const E: usize, const S: usize> {
     model: Model<'m, N, E, S>,
     values: EightSteps<'m, A, N, E, S>,
     out: &'a mut Linearised<Eight<A>, N, E, S>,
+    is_known: bool,
 }
 
 impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Stages<Eight<A>, N>
-    for AtStages<'_, '_, A, N, E, S>
+    for LinearisedStages<'_, '_, A, N, E, S>
 {
     #[inline(always)]
     fn accelerations(&mut self, s: usize, q: &[Eight<A>; N], v: &[Eight<A>; N]) -> [Eight<A>; N] {
         let (model, out) = (self.model, &mut *self.out);
-        let zero = q[0].like(0.0);
-        let count = model.elements().len();
-        let stage = Stage::<_, Reciprocal<_>, N, E>::read(&self.values, count, model.tableau.at[s]);
-        out.slopes[s] = stage.slopes(model.elements(), q, v);
-        stage.matrices(model.elements(), &out.slopes[s], &mut out.matrices[s], zero);
-        let (a, phi) = stage.accelerations(model.elements(), q, v);
+        let (elements, at) = (model.elements(), model.tableau.at[s]);
+        let stage = &mut out.stages[s];
+        if self.is_known {
+            stage.drives = self.values.drives(at);
+        } else {
+            *stage = Stage::read(&self.values, elements.len(), at);
+            out.slopes[s] = stage.slopes(elements, q, v);
+            let zero = q[0].like(0.0);
+            stage.matrices(elements, &out.slopes[s], &mut out.matrices[s], zero);
+        }
+        let (a, phi) = stage.accelerations(elements, q, v);
         out.phi[s] = phi;
         for j in 0..N {
-            out.inverse_masses[s][j] = stage.inertia[j].0;
             out.absolute[s][j] = match &stage.drives {
                 Some([_, bases]) => a[j] + bases[j],
                 None => a[j],

@@ -90,7 +90,7 @@ impl<const N: usize, const E: usize, const S: usize, const D: usize, const F: us
         } = self;
         let zero = Eight::splat(arithmetic, 0.0);
         let mut linearised = Linearised::<_, N, E, S>::nothing(zero);
-        linearised.set(arithmetic, model, &states, from);
+        linearised.set(arithmetic, model, &states, from, false);
         let mut matrices = Aligned([[[[[0.0; LANES]; N]; N]; 2]; 2]);
         let (tableau, dt) = (model.tableau, model.dt);
         step_matrices(tableau, dt, &linearised.matrices, &mut matrices, zero);

@@ -2,13 +2,13 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `stage` | accelerations at a stage, and one step: Eq. 2, with `f64` in the paper's order of operations |
-//! | `response` | sweeps forward: in the paper's order, by matrices of eight steps, by stages |
+//! | `stage` | accelerations at a stage, and one step |
+//! | `response` | sweeps forward: by matrices of eight steps, by stages |
 //! | `linearised` | eight steps about a known response, and their transpose |
 //! | `adjoint` | the exact transpose of the tangent along a record |
 //! | `maps`, `tangents` | derivatives of each step; tangents along many directions |
 //! | `trials` | the paper's trial steps, eight systems at once |
-//! | `paper` | Eq. 13 and 15-17, as the paper writes them |
+//! | `paper` | Eq. 2, 13 and 15-17, as the paper writes them |
 //! | `observation`, `nodal_observations` | displacement, velocity and acceleration at any time |
 //! | `engine` | these operations on a system |
 //! | `assembled` | the same for structures of any size, with general rows, moving supports and implicit steps |

@@ -1,10 +1,7 @@
-//! Responses: step by step, by the matrices of eight steps, and by stages prepared for eight steps.
+//! Responses: by the matrices of eight steps, and by stages prepared for eight steps.
 
 use super::linearised::{Blocks, Change, step_matrices};
-use super::stage::{
-    EightSteps, Inertia, Model, OneStep, Pair, Quotient, Reciprocal, Stage, Values, ahead,
-    increment, step,
-};
+use super::stage::{EightSteps, Model, Pair, Stage, ahead, increment};
 use crate::simd::{Aligned, Arithmetic, Eight, Kernel, LANES, Real, Row};
 
 /// Displacements and velocities at all nodes, to be written.
@@ -17,43 +14,6 @@ fn put<const N: usize>(states: &mut States<N>, i: usize, x: &Pair<f64, N>) {
             states[k][j][i] = x[k][j];
         }
     }
-}
-
-/// Response from `x` over `steps` steps, for any number type: `see` takes each node and its state.
-#[inline(always)]
-pub(crate) fn respond<
-    T: Real,
-    M: Inertia<T>,
-    V: Values<T, N>,
-    const N: usize,
-    const E: usize,
-    const S: usize,
->(
-    model: Model<N, E, S>,
-    steps: usize,
-    mut x: Pair<T, N>,
-    values: impl Fn(usize) -> V,
-    mut see: impl FnMut(usize, &Pair<T, N>),
-) {
-    see(0, &x);
-    for i in 0..steps {
-        let (tableau, elements) = (model.tableau, model.elements());
-        x = step::<T, M, N, E, S>(tableau, elements, model.dt, &values(i), &x);
-        see(i + 1, &x);
-    }
-}
-
-/// Response in the paper's order of operations.
-pub(crate) fn in_paper_order<const N: usize, const E: usize, const S: usize>(
-    model: Model<N, E, S>,
-    x: Pair<f64, N>,
-    mut states: States<N>,
-) {
-    let steps = states[0][0].len() - 1;
-    let values = |i| OneStep(model, i);
-    respond::<f64, Quotient<f64>, _, N, E, S>(model, steps, x, values, |i, x| {
-        put(&mut states, i, x);
-    });
 }
 
 /// Response of a linear structure: matrices of eight steps at once, then products.
@@ -86,7 +46,7 @@ impl<const N: usize, const E: usize, const S: usize> Kernel for Linear<'_, N, E,
                 for s in 0..S {
                     let at = model.tableau.at[s];
                     let count = model.elements().len();
-                    let stage = Stage::<_, Reciprocal<_>, N, E>::read(&values, count, at);
+                    let stage = Stage::<_, N, E>::read(&values, count, at);
                     if !is_known {
                         let slopes = stage.slopes(model.elements(), &[zero; N], &[zero; N]);
                         stage.matrices(model.elements(), &slopes, &mut d[s], zero);
@@ -210,13 +170,13 @@ impl<const N: usize, const E: usize, const S: usize> Kernel for Prepared<'_, N, 
                 };
                 let h = model.dt * factor;
                 let count = model.elements().len();
-                let stage = Stage::<_, Reciprocal<_>, N, E>::read(&values, count, tableau.at[s]);
+                let stage = Stage::<_, N, E>::read(&values, count, tableau.at[s]);
                 for (e, element) in model.elements().iter().enumerate().take(E) {
                     let p = stage.p[e].scale(h);
                     let (i, to) = element.ends::<N>();
-                    rates[s].elements[e][0] = stage.inertia[i].accelerate(p).row();
+                    rates[s].elements[e][0] = (p * stage.inverse_masses[i]).row();
                     if let Some(j) = to {
-                        rates[s].elements[e][1] = stage.inertia[j].accelerate(p).row();
+                        rates[s].elements[e][1] = (p * stage.inverse_masses[j]).row();
                     }
                 }
                 if model.drives.is_some() {

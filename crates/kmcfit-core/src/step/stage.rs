@@ -21,8 +21,7 @@ pub(crate) struct Drive<'a> {
 #[derive(Clone, Copy)]
 pub(crate) struct Model<'a, const N: usize, const E: usize, const S: usize> {
     pub tableau: &'a Tableau<S>,
-    /// See [`Model::elements`].
-    pub list: &'a [Link],
+    pub elements: Elements<'a, N, E>,
     /// Nodal values.
     pub masses: [&'a [f64]; N],
     /// Nodal values; empty for zero.
@@ -42,15 +41,33 @@ pub(crate) const DUFFING: &[Link] = &[
     Link::grounded(Law::CubicStiffness),
 ];
 
+/// Up to `E` elements of `N` coordinates. Two and three of one coordinate are [`LINEAR`] and [`DUFFING`], known to the compiler, which unrolls
+/// their loops.
+#[derive(Clone, Copy)]
+pub(crate) struct Elements<'a, const N: usize, const E: usize>(&'a [Link]);
+
+impl<'a, const N: usize, const E: usize> Elements<'a, N, E> {
+    const KNOWN: Option<&'static [Link]> = match (N, E) {
+        (1, 2) => Some(LINEAR),
+        (1, 3) => Some(DUFFING),
+        _ => None,
+    };
+
+    /// # Panics
+    /// If there are more than `E`, or others than the known ones.
+    pub fn new(list: &'a [Link]) -> Self {
+        let is_known = Self::KNOWN.is_none_or(|known| known == list);
+        assert!(is_known && list.len() <= E, "a list of its own");
+        Self(list)
+    }
+}
+
 impl<'a, const N: usize, const E: usize, const S: usize> Model<'a, N, E, S> {
-    /// The elements. Two and three of one coordinate are [`LINEAR`] and [`DUFFING`], known to the compiler, which unrolls their loops; any
-    /// other list has room for [`MOST_ELEMENTS`](crate::structure::MOST_ELEMENTS).
     #[inline(always)]
     pub fn elements(&self) -> &'a [Link] {
-        match (N, E) {
-            (1, 2) => LINEAR,
-            (1, 3) => DUFFING,
-            _ => self.list,
+        match Elements::<N, E>::KNOWN {
+            Some(known) => known,
+            None => self.elements.0,
         }
     }
 
@@ -109,32 +126,6 @@ pub(crate) trait Values<T: Real, const N: usize> {
     }
 }
 
-/// The step `i` of a model.
-pub(crate) struct OneStep<'a, const N: usize, const E: usize, const S: usize>(
-    pub Model<'a, N, E, S>,
-    pub usize,
-);
-
-impl<const N: usize, const E: usize, const S: usize> Values<f64, N> for OneStep<'_, N, E, S> {
-    #[inline(always)]
-    fn value(&self, function: Function, side: usize) -> f64 {
-        match self.0.nodal(function) {
-            [] => 0.0,
-            values => values[self.1 + side],
-        }
-    }
-
-    #[inline(always)]
-    fn drives(&self, at: At) -> Option<[[f64; N]; 2]> {
-        let drives = self.0.drives?;
-        let value = |part: Option<AtStages>| part.map_or(0.0, |f| f[at as usize][self.1]);
-        Some([
-            drives.map(|d| value(d.force)),
-            drives.map(|d| value(d.base)),
-        ])
-    }
-}
-
 /// Values from index `i` of eight neighbours; the last one repeated past the end.
 #[inline(always)]
 pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> Eight<A> {
@@ -178,77 +169,43 @@ impl<A: Arithmetic, const N: usize, const E: usize, const S: usize> Values<Eight
     }
 }
 
-/// How a force becomes an acceleration: `f/m`, as in the paper, or `f (1/m)`.
-pub(crate) trait Inertia<T: Real>: Copy {
-    fn of(mass: T) -> Self;
-    fn accelerate(self, force: T) -> T;
-}
-
-/// `f/m`: the paper's order of operations, on whose every bit its run depends.
-#[derive(Clone, Copy)]
-pub(crate) struct Quotient<T>(T);
-
-/// `f (1/m)`.
-#[derive(Clone, Copy)]
-pub(crate) struct Reciprocal<T>(pub T);
-
-impl<T: Real> Inertia<T> for Quotient<T> {
-    #[inline(always)]
-    fn of(mass: T) -> Self {
-        Quotient(mass)
-    }
-
-    #[inline(always)]
-    fn accelerate(self, force: T) -> T {
-        force / self.0
-    }
-}
-
-impl<T: Real> Inertia<T> for Reciprocal<T> {
-    #[inline(always)]
-    fn of(mass: T) -> Self {
-        Reciprocal(mass.like(1.0) / mass)
-    }
-
-    #[inline(always)]
-    fn accelerate(self, force: T) -> T {
-        force * self.0
-    }
-}
-
 /// Values at one stage.
 #[derive(Clone, Copy)]
-pub(crate) struct Stage<T, M, const N: usize, const E: usize> {
-    pub inertia: [M; N],
+pub(crate) struct Stage<T, const N: usize, const E: usize> {
+    pub inverse_masses: [T; N],
     pub p: [T; E],
     /// Forces, and accelerations of the frames.
     pub drives: Option<[[T; N]; 2]>,
 }
 
-impl<T: Real, M: Inertia<T>, const N: usize, const E: usize> Stage<T, M, N, E> {
+impl<T: Real, const N: usize, const E: usize> Stage<T, N, E> {
     #[inline(always)]
     pub fn read(values: &impl Values<T, N>, elements: usize, at: At) -> Self {
         let first = values.at(Function::Mass(0), at);
-        let (mut inertia, mut p) = ([M::of(first); N], [first.like(0.0); E]);
+        let (one, zero) = (first.like(1.0), first.like(0.0));
+        let (mut inverse_masses, mut p) = ([one / first; N], [zero; E]);
         for j in 1..N {
-            inertia[j] = M::of(values.at(Function::Mass(j), at));
+            inverse_masses[j] = one / values.at(Function::Mass(j), at);
         }
         for (e, p) in p.iter_mut().enumerate().take(elements) {
             *p = values.at(Function::Coefficient(e), at);
         }
         let drives = values.drives(at);
-        Stage { inertia, p, drives }
+        Stage {
+            inverse_masses,
+            p,
+            drives,
+        }
     }
 
-    /// Accelerations `(f - sum_e row_e p_e phi_e)/m - b''` and the forces `phi_e`, in the paper's order: quotients one by one, elements
-    /// backwards (the spring before the damper).
+    /// Accelerations `(f - sum_e row_e p_e phi_e)/m - b''`, each force by itself, and the forces `phi_e`.
     #[inline(always)]
     pub fn accelerations(&self, elements: &[Link], q: &[T; N], v: &[T; N]) -> ([T; N], [T; E]) {
         let zero = q[0].like(0.0);
         let (mut a, mut all) = ([zero; N], [zero; E]);
         if let Some([forces, _]) = &self.drives {
             for j in 0..N {
-                a[j] = self.inertia[j].accelerate(forces[j]);
+                a[j] = forces[j] * self.inverse_masses[j];
             }
         }
         for (e, element) in elements.iter().enumerate().take(E).rev() {
@@ -256,9 +213,9 @@ impl<T: Real, M: Inertia<T>, const N: usize, const E: usize> Stage<T, M, N, E> {
             all[e] = phi;
             let force = self.p[e] * phi;
             let (i, to) = element.ends::<N>();
-            a[i] = a[i] - self.inertia[i].accelerate(force);
+            a[i] = a[i] - force * self.inverse_masses[i];
             if let Some(j) = to {
-                a[j] = a[j] + self.inertia[j].accelerate(force);
+                a[j] = a[j] + force * self.inverse_masses[j];
             }
         }
         if let Some([_, bases]) = &self.drives {
@@ -299,10 +256,10 @@ impl<T: Real, M: Inertia<T>, const N: usize, const E: usize> Stage<T, M, N, E> {
             for k in 0..2 {
                 let Some(slope) = slopes[e][k] else { continue };
                 let d = &mut matrices[k];
-                let at_i = self.inertia[i].accelerate(slope);
+                let at_i = slope * self.inverse_masses[i];
                 d[i][i] = d[i][i] - at_i;
                 if let Some(j) = to {
-                    let at_j = self.inertia[j].accelerate(slope);
+                    let at_j = slope * self.inverse_masses[j];
                     d[i][j] = d[i][j] + at_i;
                     d[j][i] = d[j][i] + at_j;
                     d[j][j] = d[j][j] - at_j;
@@ -361,38 +318,36 @@ pub(crate) fn increment<T: Real, const N: usize, const S: usize>(
 }
 
 /// The equation of motion in one step.
-struct Motion<'a, V, T, M, const E: usize, const S: usize> {
+struct OneStep<'a, V, const E: usize, const S: usize> {
     tableau: &'a Tableau<S>,
     elements: &'a [Link],
     values: &'a V,
-    number: std::marker::PhantomData<(T, M)>,
 }
 
-impl<T: Real, V: Values<T, N>, M: Inertia<T>, const N: usize, const E: usize, const S: usize>
-    Stages<T, N> for Motion<'_, V, T, M, E, S>
+impl<T: Real, V: Values<T, N>, const N: usize, const E: usize, const S: usize> Stages<T, N>
+    for OneStep<'_, V, E, S>
 {
     #[inline(always)]
     fn accelerations(&mut self, s: usize, q: &[T; N], v: &[T; N]) -> [T; N] {
         let at = self.tableau.at[s];
-        let stage = Stage::<T, M, N, E>::read(self.values, self.elements.len(), at);
+        let stage = Stage::<T, N, E>::read(self.values, self.elements.len(), at);
         stage.accelerations(self.elements, q, v).0
     }
 }
 
-/// State after one step: with [`Quotient`] the paper's Eq. 2 in its order of operations.
+/// State after one step.
 #[inline(always)]
-pub(crate) fn step<T: Real, M: Inertia<T>, const N: usize, const E: usize, const S: usize>(
+pub(crate) fn step<T: Real, const N: usize, const E: usize, const S: usize>(
     tableau: &Tableau<S>,
     elements: &[Link],
     dt: f64,
     values: &impl Values<T, N>,
     x: &Pair<T, N>,
 ) -> Pair<T, N> {
-    let mut motion = Motion::<_, T, M, E, S> {
+    let mut motion = OneStep::<_, E, S> {
         tableau,
         elements,
         values,
-        number: std::marker::PhantomData,
     };
     let [dq, dv] = increment(tableau, dt, x, &mut motion);
     [ahead(&x[0], 1.0, &dq), ahead(&x[1], 1.0, &dv)]

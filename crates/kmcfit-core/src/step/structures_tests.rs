@@ -2,8 +2,8 @@
 
 use super::adjoint::{Adjoint, Gradient};
 use super::maps::{Linearise, StepMaps, Wanted};
-use super::response::{Linear, Prepared, in_paper_order, respond};
-use super::stage::{Drive, Function, Model, Quotient, Values};
+use super::response::{Linear, Prepared};
+use super::stage::{Drive, Elements, Function, Model, Values, step};
 use super::tableau::{At, MIDPOINT, RK4, Tableau};
 use crate::simd::{self, Arithmetic, Kernel, LANES, Real};
 use crate::structure::{CoefficientKind, Law, Link};
@@ -98,7 +98,7 @@ impl<const N: usize> Structure<N> {
         let stages = |of: &'a [Vec<f64>; 3]| Some(of.each_ref().map(Vec::as_slice));
         Model {
             tableau,
-            list: &self.elements,
+            elements: Elements::new(&self.elements),
             masses: from_fn(|j| self.functions[j].as_slice()),
             coefficients: from_fn(|e| self.functions.get(N + e).map_or(&[][..], |p| p)),
             drives: self.inputs.as_ref().map(|inputs| {
@@ -191,6 +191,42 @@ impl<const N: usize, const S: usize> Values<Dual64, N> for Along<'_, N, S> {
     }
 }
 
+/// Response, step by step, and its change along a direction of the initial state, the functions and the inputs.
+fn respond<const N: usize, const S: usize>(
+    model: Model<N, ELEMENTS, S>,
+    x: [[f64; N]; 2],
+    change: [[f64; N]; 2],
+    functions: &[Vec<f64>],
+    inputs: &[[Vec<f64>; N]; 2],
+) -> [States<N>; 2] {
+    let nodes = model.masses[0].len();
+    let mut out = [zeros(nodes), zeros(nodes)];
+    let mut x = from_fn(|k| from_fn(|j| Dual64::new(x[k][j], change[k][j])));
+    for i in 0..nodes {
+        if i > 0 {
+            let along = Along {
+                model,
+                functions,
+                inputs,
+                step: i - 1,
+            };
+            let (tableau, elements) = (model.tableau, model.elements());
+            x = step::<_, N, ELEMENTS, S>(tableau, elements, model.dt, &along, &x);
+        }
+        for k in 0..2 {
+            for j in 0..N {
+                (out[0][k][j][i], out[1][k][j][i]) = (x[k][j].re, x[k][j].eps);
+            }
+        }
+    }
+    out
+}
+
+/// No change of functions and inputs.
+fn nothing<const N: usize>(nodes: usize) -> (Vec<Vec<f64>>, [[Vec<f64>; N]; 2]) {
+    (vec![vec![0.0; nodes]; N + ELEMENTS], zeros(nodes))
+}
+
 /// Agreement of a number with an exact one, relative to the size of what is summed.
 fn close(found: f64, exact: f64, size: f64, what: &str) {
     assert!(
@@ -209,8 +245,8 @@ fn check<const N: usize, const D: usize, const S: usize>(
     let structure = Structure::<N>::new(nodes, is_driven, others);
     let model = structure.model(tableau);
     let x = structure.initial;
-    let mut exact = zeros::<N>(nodes);
-    in_paper_order(model, x, slices_mut(&mut exact));
+    let (functions, inputs) = nothing(nodes);
+    let [exact, _] = respond(model, x, [[0.0; N]; 2], &functions, &inputs);
     for is_linear in [false, structure.is_linear()] {
         let each = simd::on_each(|| Whole {
             model,
@@ -274,34 +310,14 @@ fn check<const N: usize, const D: usize, const S: usize>(
             };
             let inputs: [[Vec<f64>; N]; 2] =
                 from_fn(|part| from_fn(|j| input((part * N + j) as f64 + 0.2)));
-            let mut tangent = zeros::<N>(nodes);
-            let mut cost = 0.0;
-            let start = from_fn(|k| from_fn(|j| Dual64::new(x[k][j], change[k][j])));
-            let values = |step| Along {
-                model,
-                functions: &functions,
-                inputs: &inputs,
-                step,
-            };
-            respond::<Dual64, Quotient<_>, _, N, ELEMENTS, S>(
-                model,
-                nodes - 1,
-                start,
-                values,
-                |i, x| {
-                    for k in 0..2 {
-                        for j in 0..N {
-                            tangent[k][j][i] = x[k][j].eps;
-                            cost += source[k][j][i] * x[k][j].eps;
-                        }
-                    }
-                },
-            );
+            let [_, tangent] = respond(model, x, change, &functions, &inputs);
             if !has_inputs {
                 let products = |a: &[f64], b: &[f64]| -> [f64; 2] {
                     let pairs = || a.iter().zip(b).map(|(a, b)| a * b);
                     [pairs().sum(), pairs().map(f64::abs).sum()]
                 };
+                let pairs = tangent.as_flattened().iter().zip(source.as_flattened());
+                let cost: f64 = pairs.map(|(x, by)| products(x, by)[0]).sum();
                 let by = gradient.iter().zip(&functions).map(|(g, d)| products(g, d));
                 let initial = products(by_initial.as_flattened(), change.as_flattened());
                 let [found, size] = by.fold(initial, |[a, b], [c, d]| [a + c, b + d]);
@@ -402,27 +418,24 @@ fn two_modes_converge_with_the_order_of_the_method() {
         let (one, four) = (vec![1.0; nodes], vec![4.0; nodes]);
         let dt = 6.0 / (nodes - 1) as f64;
         let x = [[0.8, -0.2], [0.0, 0.0]];
-        let mut out = zeros::<2>(nodes);
+        let (functions, inputs) = nothing(nodes);
         macro_rules! by {
-            ($tableau:expr) => {
-                in_paper_order(
-                    Model::<2, 4, _> {
-                        tableau: $tableau,
-                        list: &list,
-                        masses: [&one, &one],
-                        coefficients: [&four, &four, &four, &[]],
-                        drives: None,
-                        dt,
-                    },
-                    x,
-                    slices_mut(&mut out),
-                )
-            };
+            ($tableau:expr) => {{
+                let model = Model::<2, ELEMENTS, _> {
+                    tableau: $tableau,
+                    elements: Elements::new(&list),
+                    masses: [&one, &one],
+                    coefficients: from_fn(|e| if e < 3 { &four[..] } else { &[] }),
+                    drives: None,
+                    dt,
+                };
+                respond(model, x, [[0.0; 2]; 2], &functions, &inputs)
+            }};
         }
-        match is_midpoint {
+        let [out, _] = match is_midpoint {
             true => by!(&MIDPOINT),
             false => by!(&RK4),
-        }
+        };
         let exact = |t: f64| 0.3 * (2.0 * t).cos() + 0.5 * (12.0f64.sqrt() * t).cos();
         (0..nodes)
             .map(|i| (out[0][0][i] - exact(i as f64 * dt)).abs())

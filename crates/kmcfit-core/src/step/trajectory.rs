@@ -128,13 +128,12 @@ impl Trajectory {
         }
     }
 
-    /// True if all values are finite. Once not finite, a response remains so; the last node decides.
-    pub(crate) fn is_finite(&self) -> bool {
-        self.is_finite_at(self.nodes - 1)
-    }
-
-    /// True if the state at a node is finite.
-    pub(crate) fn is_finite_at(&self, node: usize) -> bool {
-        (0..self.components()).all(|c| self.component(c)[node].is_finite())
+    /// The first node whose state is not finite; `None` for a response that is finite. Once not finite, it remains so: the last node decides.
+    pub(crate) fn first_not_finite(&self) -> Option<usize> {
+        let is_finite = |i: usize| (0..self.components()).all(|c| self.component(c)[i].is_finite());
+        match is_finite(self.nodes - 1) {
+            true => None,
+            false => (0..self.nodes).find(|i| !is_finite(*i)),
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! They choose candidates for the trial of least cost: the order of summation and the reciprocal of the mass differ from the paper's, whose
 //! order of operations decides among the candidates.
 
-use super::stage::{Function, LINEAR, Pair, Reciprocal, Values, step};
+use super::stage::{Function, LINEAR, Pair, Values, step};
 use super::tableau::{At, MIDPOINT};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Real, Row};
 use crate::system::State;
@@ -135,9 +135,8 @@ impl<const R: usize> Kernel for Trials<'_, R> {
                         - length * Eight::splat(arithmetic, ray.direction[f][i]);
                 }
                 if i > 0 {
-                    states[r] = step::<_, Reciprocal<_>, 1, 2, 2>(
-                        &MIDPOINT, LINEAR, ray.step, &values[r], &states[r],
-                    );
+                    states[r] =
+                        step::<_, 1, 2, 2>(&MIDPOINT, LINEAR, ray.step, &values[r], &states[r]);
                 }
                 let residual = states[r][0][0] - sample;
                 sums[r] += (residual * residual).scale(weight);

@@ -2,7 +2,7 @@
 
 use super::banded::Banded;
 use super::{Ends, Law, Link, MOST_ELEMENTS};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use thiserror::Error;
 
 /// A structure of any number of coordinates:
@@ -281,30 +281,55 @@ impl Structure {
         self.largest_rate(&extremes.collect::<Vec<f64>>())
     }
 
+    /// The rates `lambda`, 1/s, of the solutions `exp(lambda t)` with linear springs and dampers; empty where the mass matrix is not positive
+    /// definite or a value is not finite.
+    pub(crate) fn rates(&self, functions: &[f64]) -> Vec<Complex<f64>> {
+        let n = self.coordinates;
+        let over_mass = |law| {
+            let mass = self.mass_matrix(functions).cholesky()?;
+            let matrix = mass.solve(&self.matrix_of(|of| of == law, functions));
+            matrix.iter().all(|x| x.is_finite()).then_some(matrix)
+        };
+        let pair = over_mass(Law::Stiffness).zip(over_mass(Law::Damping));
+        pair.map_or(Vec::new(), |(stiffness, damping)| {
+            let mut first_order = DMatrix::zeros(2 * n, 2 * n);
+            first_order.view_mut((0, n), (n, n)).fill_with_identity();
+            first_order.view_mut((n, 0), (n, n)).copy_from(&-stiffness);
+            first_order.view_mut((n, n), (n, n)).copy_from(&-damping);
+            first_order.complex_eigenvalues().iter().copied().collect()
+        })
+    }
+
+    fn mass_matrix(&self, functions: &[f64]) -> DMatrix<f64> {
+        self.sum_of(self.inertias.iter().zip(functions.iter().copied()))
+    }
+
+    /// Matrix of all elements of some laws.
+    fn matrix_of(&self, is_meant: impl Fn(Law) -> bool, functions: &[f64]) -> DMatrix<f64> {
+        let elements = self.ends.iter().enumerate();
+        let meant = elements.filter(|(e, _)| is_meant(self.laws[*e]));
+        self.sum_of(meant.map(|(e, ends)| (ends, functions[self.function_of(e)])))
+    }
+
+    fn sum_of<'a>(&self, rows: impl Iterator<Item = (&'a Ends, f64)>) -> DMatrix<f64> {
+        let n = self.coordinates;
+        let mut matrix = DMatrix::zeros(n, n);
+        for (ends, value) in rows {
+            for (i, a) in free(ends, n) {
+                free(ends, n).for_each(|(j, b)| matrix[(i, j)] += value * a * b);
+            }
+        }
+        matrix
+    }
+
     /// Eigenvalues of the matrix of all elements of some laws relative to the mass matrix, ascending.
     fn relative_to_mass(
         &self,
         is_meant: impl Fn(Law) -> bool,
         functions: &[f64],
     ) -> Option<Vec<f64>> {
-        let n = self.coordinates;
-        let count = self.inertias.len();
-        let sum = |wanted: &dyn Fn(usize) -> bool| {
-            let mut matrix = DMatrix::zeros(n, n);
-            let rows = self.inertias.iter().chain(&self.ends);
-            for (row, ends) in rows.enumerate().filter(|(row, _)| wanted(*row)) {
-                let value = match row.checked_sub(count) {
-                    None => functions[row],
-                    Some(e) => functions[self.function_of(e)],
-                };
-                for (i, a) in free(ends, n) {
-                    free(ends, n).for_each(|(j, b)| matrix[(i, j)] += value * a * b);
-                }
-            }
-            matrix
-        };
-        let mass = sum(&|f| f < count).cholesky()?;
-        let of_law = sum(&|row| row >= count && is_meant(self.laws[row - count]));
+        let mass = self.mass_matrix(functions).cholesky()?;
+        let of_law = self.matrix_of(is_meant, functions);
         let half = mass.l().solve_lower_triangular(&of_law)?;
         let mut whole = mass.l().solve_lower_triangular(&half.transpose())?;
         whole = 0.5 * (&whole + whole.transpose());

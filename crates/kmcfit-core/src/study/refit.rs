@@ -2,7 +2,7 @@
 
 use crate::objective::GradientKind;
 use crate::problem::Problem;
-use crate::qp::{StageLayout, Subproblem, project_within};
+use crate::qp::{StageLayout, Subproblem, project_by};
 use crate::simd::sum::rms;
 use crate::solvers::{FitSettings, Initial, Solver, Stopping};
 
@@ -68,7 +68,7 @@ pub fn nearest(problem: &Problem, theta: &[f64], sizes: &[f64]) -> Option<Vec<f6
     }
     let metric: Vec<f64> = sizes.iter().map(|s| 1.0 / (s * s)).collect();
     let layout = StageLayout::of(&problem.functions);
-    let iterations = Subproblem::ITERATIONS;
-    let projection = project_within(iterations, &problem.constraints, theta, &metric, layout);
+    let (constraints, solve) = (&problem.constraints, Subproblem::solve);
+    let projection = project_by(constraints, theta, &metric, layout, solve);
     projection.status.is_point().then_some(projection.theta)
 }

@@ -45,10 +45,4 @@ impl System {
             _ => None,
         })
     }
-
-    /// True if the response is linear in the initial state and there is no excitation.
-    pub fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
-        let is_free = || excitation.is_none_or(Excitation::is_zero);
-        self.structure.is_linear() && is_free()
-    }
 }

@@ -1,6 +1,10 @@
 //! Stability of explicit steps: the largest rate of the linear terms, and the number of nodes that it requires.
 
 use super::{Law, Method, NodalCoefficients, System};
+use nalgebra::Complex;
+
+/// Growth over the record, by the steps alone, from which on they are unstable.
+const GROWTH: f64 = 1e3;
 
 impl Method {
     /// Largest product of step and rate, `h |lambda|`, of a stable step, with a margin of a tenth. Decay is stable up to
@@ -13,6 +17,16 @@ impl Method {
             Method::ImplicitMidpoint => f64::INFINITY,
         }
     }
+
+    /// The factor of a solution `exp(lambda t)` in one step, with `z = h lambda`.
+    fn factor(self, z: Complex<f64>) -> Complex<f64> {
+        let second = (z / 2.0 + 1.0) * z + 1.0;
+        match self {
+            Method::Midpoint => second,
+            Method::Rk4 => second + (z / 4.0 + 1.0) * z * z * z / 6.0,
+            Method::ImplicitMidpoint => (z / 2.0 + 1.0) / (-z / 2.0 + 1.0),
+        }
+    }
 }
 
 impl System {
@@ -21,6 +35,26 @@ impl System {
         let steps = self.grid.duration() * self.largest_rate(nodal) / self.method.stability_limit();
         // The cast saturates.
         (steps.ceil() as usize).saturating_add(1)
+    }
+
+    /// True where steps beyond the limit of stability let a motion with the linear springs and dampers of `nodal` grow over the record, by
+    /// more than it grows itself. Steps beyond the limit at some nodes only, of decay, or by a bound alone, need not.
+    pub fn is_unstable(&self, nodal: &NodalCoefficients) -> bool {
+        let (step, limit) = (self.grid.step(), self.method.stability_limit());
+        let is_beyond = step * self.largest_rate(nodal) > limit;
+        let growth = |i: usize| {
+            let values: Vec<f64> = nodal.functions().map(|f| f[i]).collect();
+            let rates = self.structure.rates(&values);
+            let own = rates.iter().fold(0.0, |most: f64, rate| most.max(rate.re));
+            let fast = rates.iter().map(|rate| rate * step);
+            let factors = fast
+                .filter(|z| z.norm() > limit)
+                .map(|z| self.method.factor(z));
+            let largest = factors.map(Complex::norm).fold(0.0, f64::max);
+            largest.ln() - step * own
+        };
+        let growths = (0..self.grid.nodes()).map(growth);
+        is_beyond && growths.filter(|g| g.is_finite()).sum::<f64>() > GROWTH.ln()
     }
 
     /// Of one coordinate the largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s, where nodes at which it is not finite
@@ -58,7 +92,7 @@ fn rate(m: f64, c: f64, k: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::structure::Structure;
+    use crate::structure::{Ends, Structure};
     use crate::system::Grid;
 
     fn system(method: Method) -> System {
@@ -85,5 +119,52 @@ mod tests {
         let midpoint = system(Method::Midpoint);
         assert_eq!(midpoint.stable_nodes(&constant(2.0, 0.0, 200.0)), 13);
         assert_eq!(rk4.stable_nodes(&constant(0.0, 1.0, 1.0)), 1);
+    }
+
+    /// Steps of 0.02 s: undamped oscillation at the limits of both methods, decay at that of `rk4`, growth of the system itself, and a single
+    /// node with a large stiffness.
+    #[test]
+    fn steps_are_unstable_where_they_let_a_motion_grow() {
+        let is_unstable = |method, m, c, k| system(method).is_unstable(&constant(m, c, k));
+        let square = |rate: f64| rate * rate / 4e-4;
+        assert!(!is_unstable(Method::Rk4, 2.0, 0.0, 2.0 * square(2.82)));
+        assert!(is_unstable(Method::Rk4, 2.0, 0.0, 2.0 * square(2.9)));
+        assert!(!is_unstable(Method::Rk4, 1.0, 2.7 / 0.02, 1.0));
+        assert!(is_unstable(Method::Rk4, 1.0, 3.0 / 0.02, 1.0));
+        assert!(!is_unstable(Method::Midpoint, 1.0, 0.0, square(1.7)));
+        assert!(is_unstable(Method::Midpoint, 1.0, 0.0, square(1.9)));
+        assert!(!is_unstable(Method::Rk4, 1.0, 0.0, -square(3.0)));
+        assert!(!is_unstable(
+            Method::ImplicitMidpoint,
+            1.0,
+            0.0,
+            square(50.0)
+        ));
+        let mut nodal = constant(1.0, 0.0, 1.0);
+        nodal.coefficients[1][50] = square(4.0);
+        assert!(!system(Method::Rk4).is_unstable(&nodal));
+    }
+
+    /// Critical damping: the dampers alone would be unstable, which is the bound of the rates.
+    #[test]
+    fn a_bound_of_the_rates_refuses_nothing() {
+        let coordinates =
+            (0..2).flat_map(|j| [Law::Damping, Law::Stiffness].map(|law| (law, Ends::ground(j))));
+        let inertias = vec![Ends::ground(0), Ends::ground(1)];
+        let structure = Structure::new(2, 0, inertias, coordinates.collect()).unwrap();
+        let two = System {
+            structure,
+            ..system(Method::Rk4)
+        };
+        let nodal = |rate: f64| {
+            let both = [vec![2.0 * rate; 101], vec![rate * rate; 101]];
+            NodalCoefficients {
+                inertias: vec![vec![1.0; 101]; 2],
+                coefficients: [both.clone(), both].concat(),
+            }
+        };
+        assert!(two.stable_nodes(&nodal(75.0)) > 101);
+        assert!(!two.is_unstable(&nodal(75.0)));
+        assert!(two.is_unstable(&nodal(150.0)));
     }
 }

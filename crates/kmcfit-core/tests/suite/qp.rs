@@ -35,6 +35,17 @@ fn a_half_plane() {
     );
 }
 
+/// A program that active sets solve without Clarabel.
+#[test]
+fn clarabel_alone_is_the_reference() {
+    let mut sub = nearest(&[1.0, 2.0]);
+    sub.bound([(0, 1.0), (1, 1.0)], f64::NEG_INFINITY, 2.0);
+    sub.elimination_order = vec![0; 2];
+    let [few, clarabel] = [sub.solve(), sub.solve_by_clarabel(Subproblem::ITERATIONS)];
+    assert_eq!((few.attempts, clarabel.attempts), (0, 1));
+    assert!(close(&few.z, &clarabel.z, 1e-8), "{:?}", clarabel.z);
+}
+
 #[test]
 fn bounds_from_below_have_negative_multipliers() {
     let mut sub = nearest(&[-3.0, 0.5]);

@@ -6,7 +6,7 @@
 
 use super::{Step, StepRule, difference, no_step};
 use crate::constraints::TOLERANCE;
-use crate::qp::{ConicStatus, StageLayout, project_within};
+use crate::qp::{ConicStatus, StageLayout, Subproblem, project_by};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
@@ -105,12 +105,13 @@ impl ProjectedGradient {
             return Ok(target);
         }
         let iterations = work.program_iterations;
-        let layout = match wants_clarabel {
-            true => None,
-            false => StageLayout::of(&work.problem().functions),
+        let solve = |sub: &Subproblem| match wants_clarabel {
+            true => sub.solve_by_clarabel(iterations),
+            false => sub.solve_within(iterations),
         };
+        let layout = StageLayout::of(&work.problem().functions);
         let projection =
-            work.program(|| project_within(iterations, constraints, &target, &self.metric, layout));
+            work.program(|| project_by(constraints, &target, &self.metric, layout, solve));
         match projection.status {
             ConicStatus::Solved | ConicStatus::Almost
                 if constraints.hold(&projection.theta, TOLERANCE) =>

@@ -6,7 +6,7 @@
 use super::super::Trajectory;
 use super::super::engine::Driven;
 use super::super::observation::hermite;
-use super::stage::Stage;
+use super::stage::AssembledStage;
 use super::stage_derivatives::StageShares;
 use crate::record::ChannelKind;
 use crate::structure::Ends;
@@ -28,7 +28,7 @@ pub struct RowObserver<'a> {
     driven: Driven<'a>,
     states: &'a Trajectory,
     functions: Vec<&'a [f64]>,
-    stage: Stage<f64>,
+    stage: AssembledStage<f64>,
     shares: StageShares,
     out: RowObservation,
 }
@@ -41,7 +41,7 @@ impl<'a> RowObserver<'a> {
         let zeros = |count: usize| [vec![0.0; count], vec![0.0; count]];
         Self {
             functions: driven.nodal.functions().collect(),
-            stage: Stage::new(structure, 0.0),
+            stage: AssembledStage::new(structure, 0.0),
             shares: StageShares::zeros(structure),
             out: RowObservation {
                 value: 0.0,

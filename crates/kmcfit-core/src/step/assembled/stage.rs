@@ -55,7 +55,7 @@ impl<T: Real> StageValues<T> {
 /// Internal states depend on their own element alone and are eliminated: slopes and `phi` are those of the force with the internal state that
 /// the elongation at the stage gives.
 #[derive(Debug, Clone)]
-pub(crate) struct Stage<T> {
+pub(crate) struct AssembledStage<T> {
     pub values: StageValues<T>,
     /// Displacements and velocities at the stage, those of supports last.
     pub q: Vec<T>,
@@ -106,7 +106,7 @@ const CONVERGED: f64 = 1e-8;
 /// Share of a step below which it is not halved again.
 const SHORTEST: f64 = 1e-3;
 
-impl<T: Scalar> Stage<T> {
+impl<T: Scalar> AssembledStage<T> {
     pub fn new(structure: &Structure, zero: T) -> Self {
         let (n, all) = (
             structure.coordinates(),

@@ -1,6 +1,6 @@
 //! Derivatives at one stage, forwards and back.
 
-use super::stage::{Stage, StageValues};
+use super::stage::{AssembledStage, StageValues};
 use crate::structure::Structure;
 
 /// Derivatives with respect to the values at a stage.
@@ -21,7 +21,7 @@ impl StageShares {
     }
 }
 
-impl Stage<f64> {
+impl AssembledStage<f64> {
     /// Multipliers of the state that the stage starts from, added to `state`, for multipliers `velocity` of the velocities at the stage,
     /// `acceleration` of its accelerations and `rate` of the rates of its internal states; the factor is that of the stage.
     pub fn pull(

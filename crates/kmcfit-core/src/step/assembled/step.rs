@@ -1,7 +1,7 @@
 //! Steps of a structure, their tangents and their transposes, stage by stage.
 
 use super::super::tableau::{At, MIDPOINT, RK4};
-use super::stage::{Scalar, Stage, StageValues, Unsolved};
+use super::stage::{AssembledStage, Scalar, StageValues, Unsolved};
 use super::stage_derivatives::StageShares;
 use crate::structure::Structure;
 use crate::system::Method;
@@ -51,7 +51,7 @@ pub(crate) struct Steps<'a, T> {
     pub structure: &'a Structure,
     scheme: Scheme,
     dt: f64,
-    stages: Vec<Stage<T>>,
+    stages: Vec<AssembledStage<T>>,
     from: Vec<T>,
     sum: Vec<T>,
 }
@@ -64,7 +64,7 @@ impl<'a, T: Scalar> Steps<'a, T> {
             structure,
             scheme,
             dt,
-            stages: vec![Stage::new(structure, zero); scheme.at.len()],
+            stages: vec![AssembledStage::new(structure, zero); scheme.at.len()],
             from: state.clone(),
             sum: state,
         }

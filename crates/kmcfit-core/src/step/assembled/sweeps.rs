@@ -28,15 +28,15 @@ pub struct Motion<'a> {
 
 /// A motion that cannot be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[error("{} in the step from node {node}", match .cause {
-    Cause::Mass => "the mass matrix is not positive definite",
-    Cause::NoConvergence => "an implicit step has no solution",
-    Cause::Overflow | Cause::CostOverflow => "the response overflows",
+#[error("{} node {node}", match .cause {
+    Cause::Mass => "the mass matrix is not positive definite in the step from",
+    Cause::NoConvergence => "there is no solution of the implicit step from",
+    Cause::Overflow | Cause::CostOverflow => "the response overflows at",
 })]
 pub struct MotionError {
     /// Cause.
     pub cause: Cause,
-    /// Node at the left end of the step.
+    /// As that of a [`SimulationError`](crate::SimulationError).
     pub node: usize,
 }
 
@@ -114,6 +114,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Response from the state `initial`: the displacements of all coordinates, then their velocities. `states` gives the number of nodes.
+    /// Up to [`Motion::largest_stable_step`] explicit steps let no motion grow that decays; whether they are longer is not tested here.
     ///
     /// # Errors
     /// A [`MotionError`] if the mass matrix is not positive definite, an implicit step is not solved, or the response overflows.
@@ -128,16 +129,13 @@ impl<'a> Motion<'a> {
             (steps.advance(self, i, &mut x)).map_err(|unsolved| Self::error(i, unsolved))?;
             states.write(i + 1, &x);
         }
-        match states.is_finite() {
-            true => Ok(()),
-            false => {
-                let finite = (0..states.nodes()).take_while(|i| states.is_finite_at(*i));
-                Err(MotionError {
-                    cause: Cause::Overflow,
-                    node: finite.count().saturating_sub(1),
-                })
-            }
-        }
+        let overflow = |node| MotionError {
+            cause: Cause::Overflow,
+            node,
+        };
+        states
+            .first_not_finite()
+            .map_or(Ok(()), |node| Err(overflow(node)))
     }
 
     /// Derivatives of a cost of the response `states` with the derivatives `source` by the states at all nodes: those by the functions' values

@@ -15,7 +15,6 @@ use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
 use crate::solvers::optimality::Optimality;
 use crate::solvers::reason::Reason;
-use crate::solvers::settings::QpSolver;
 use proposal::{
     Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, is_below_rounding, propose,
 };
@@ -227,12 +226,7 @@ fn subproblem(
 ) -> Subproblem {
     let (parameters, evaluation) = (&point.parameters, &point.evaluation);
     let (problem, timings) = (work.problem(), &mut work.timings);
-    let (mut sub, _) = linearise(problem, parameters, evaluation, linearization, timings);
-    if work.qp == QpSolver::Clarabel {
-        // Without stages all programs go to Clarabel.
-        sub.layout = None;
-    }
-    sub
+    linearise(problem, parameters, evaluation, linearization, timings).0
 }
 
 #[cfg(test)]

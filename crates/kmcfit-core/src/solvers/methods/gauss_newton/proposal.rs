@@ -109,17 +109,18 @@ pub(super) fn propose(
         })
     };
     let iterations = work.program_iterations;
-    if work.qp == QpSolver::Clarabel && !constraints.is_empty() {
-        let solution = work.program(|| sub.solve_within(iterations));
-        return of_program(work, sub, point, &solution, 0.0);
+    let is_plain = constraints.is_empty() && sub.absolute.is_empty();
+    if work.qp == QpSolver::Clarabel && !is_plain {
+        let solution = work.program(|| sub.solve_by_clarabel(iterations));
+        return of_program(work, sub, point, &solution);
     }
     // Bounds that noisy data make active mostly stay active, and the stages take no longer than one plain step.
     let is_noisy = cost > NOISE * work.problem().zero_response_misfit();
     if is_noisy
         && sub.layout.is_some()
         && sub.is_active_at_zero(ACTIVE)
-        && let Some((solution, excess)) = work.program(|| sub.step_on_stages(iterations))
-        && let step @ ProposalOutcome::Step(_) = of_program(work, sub, point, &solution, excess)
+        && let Some((z, excess)) = work.program(|| sub.step_on_stages(iterations))
+        && let step @ ProposalOutcome::Step(_) = of_point(work, sub, point, &z, true, |_| excess)
     {
         return step;
     }
@@ -150,27 +151,46 @@ pub(super) fn propose(
             }
         }
     }
-    let (solution, excess) = work.program(|| match sub.step_on_stages(iterations) {
-        Some(step) => step,
-        None => (sub.solve_within(iterations), 0.0),
-    });
-    of_program(work, sub, point, &solution, excess)
+    let step = work
+        .program(|| (sub.step_on_stages(iterations)).ok_or_else(|| sub.solve_within(iterations)));
+    match step {
+        Ok((z, excess)) => of_point(work, sub, point, &z, true, |_| excess),
+        Err(solution) => of_program(work, sub, point, &solution),
+    }
 }
 
-/// Step to the solution of a program whose cost may exceed the minimum by `excess`; unsolved if it violates the constraints or
-/// predicts a higher cost.
+/// Step to the solution of a program.
 fn of_program(
     work: &mut CountedEvaluator,
     sub: &Subproblem,
     point: &Iterate,
     solution: &Solution,
-    excess: f64,
 ) -> ProposalOutcome {
     if !solution.status.is_point() {
         return ProposalOutcome::Unsolved(solution.status);
     }
+    let is_solved = solution.status == ConicStatus::Solved;
+    let share = match (is_solved, &solution.kkt) {
+        (true, _) => 0.0,
+        (false, Some(kkt)) => kkt.cost(),
+        (false, None) => f64::INFINITY,
+    };
+    let uncertainty = |cost: f64| share * cost;
+    of_point(work, sub, point, &solution.z, is_solved, uncertainty)
+}
+
+/// Step to a point of a program, with the uncertainty of the predicted decrease for the larger of the costs at both ends; unsolved if it
+/// violates the constraints or predicts a higher cost.
+fn of_point(
+    work: &mut CountedEvaluator,
+    sub: &Subproblem,
+    point: &Iterate,
+    z: &[f64],
+    is_solved: bool,
+    uncertainty: impl Fn(f64) -> f64,
+) -> ProposalOutcome {
     let (constraints, cost) = (&work.problem().constraints, point.evaluation.cost);
-    let parameters = constraints.moved(&point.parameters, &solution.z);
+    let parameters = constraints.moved(&point.parameters, z);
     if !constraints.hold(&parameters, constraints::TOLERANCE) {
         return ProposalOutcome::Unsolved(ConicStatus::Stalled);
     }
@@ -183,12 +203,8 @@ fn of_program(
     ProposalOutcome::Step(Proposal {
         parameters,
         predicted,
-        uncertainty: match (solution.status, &solution.kkt) {
-            (ConicStatus::Solved, _) => excess,
-            (_, Some(kkt)) => kkt.cost() * cost.max(model),
-            (_, None) => f64::INFINITY,
-        },
-        is_solved: solution.status == ConicStatus::Solved,
+        uncertainty: uncertainty(cost.max(model)),
+        is_solved,
     })
 }
 
