@@ -13,6 +13,7 @@ use kmcfit_core::internals::assessment::{
     estimates, verdict_assumptions, verdict_reasons,
 };
 use kmcfit_core::internals::diagnostics::standard_deviation;
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::solvers::{EquationBalance, Status};
 
 impl FittedModel<'_> {
@@ -232,7 +233,7 @@ impl FittedModel<'_> {
             return Vec::new();
         }
         let problem = &self.model.problem;
-        let mut found = estimates(problem, self.fit, self.run_assessment.means().as_ref());
+        let mut found = estimates(problem, self.fit, self.run_assessment.quantities());
         for ((_, estimate), function) in (found.iter_mut())
             .filter(|(name, _)| !is_ratio(name))
             .zip(problem.functions.iter())
@@ -267,10 +268,7 @@ fn of_balance(balance: &EquationBalance) -> Option<Doubt> {
 
 /// True for the ratios among the estimates.
 fn is_ratio(name: &str) -> bool {
-    matches!(
-        name,
-        "natural_frequency" | "damping_ratio" | "k_over_m" | "c_over_m"
-    )
+    Ratio::named(name).is_some()
 }
 
 /// An assumption of a verdict as a sentence.

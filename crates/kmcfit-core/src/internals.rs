@@ -6,10 +6,10 @@ pub mod assessment {
         AmplitudeRival, BEYOND_SIGMA, BasisComparison, BasisTest, ClassicalEstimate,
         ClassicalMethod, CoarseBasis, Doubt, EXACT, EquationErrorIntervals, Estimate,
         EstimateErrors, EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics,
-        FunctionSummary, Implausible, LargeCovariance, ModelTests, NoIntervals, POOR, Parts,
-        Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Severity, StepCheck,
-        TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, all_diagnostics, estimates,
-        function_summaries, outliers, pattern, standard_error, verdict_assumptions,
+        FunctionSummary, Implausible, ModelTests, NoIntervals, POOR, Parts, Plausibility,
+        RECOVERY_TOLERANCE, RecordError, ResidualPattern, Severity, StepCheck, TruthErrors,
+        Unidentified, VerdictAssumption, VerdictLevel, all_diagnostics, estimates,
+        function_summaries, outliers, pattern, quantities_of_many, verdict_assumptions,
         verdict_reasons,
     };
 }
@@ -36,7 +36,7 @@ pub mod diagnostics {
 pub mod functions {
     pub use crate::functions::{
         Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Gram, Parameterization,
-        Penalty, Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
+        Penalty, Prior, Ratio, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
     };
 }
 pub mod host {
@@ -44,9 +44,9 @@ pub mod host {
 }
 pub mod identifiability {
     pub use crate::identifiability::{
-        Band, BandSide, Bands, Classification, ClassificationKind, Condition, CovarianceKind,
-        FunctionClassification, Gain, MeanOverRecord, Means, RankFinding, Ranked, RelativeChange,
-        ScaleFreedom, ScaleSource, ScalingAmbiguity, Sensitivity, SingularSpectrum,
+        Band, Bands, Classification, ClassificationKind, Condition, CovarianceKind, Curve,
+        FunctionClassification, Gain, Quantities, Quantity, RankFinding, Ranked, ScaleFreedom,
+        ScaleSource, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Target,
         classify_functions, is_negligible, rank_experiments, scale_source, structural_rank,
     };
     pub use crate::spans::span_words;
@@ -64,7 +64,7 @@ pub mod noise {
     pub use crate::noise::{Autoregression, Correlation, CorrelationLaw, automatic_bandwidth};
 }
 pub mod number_format {
-    pub use crate::number_format::{at_most, significant};
+    pub use crate::number_format::{at_most, number_or_nan, significant};
 }
 pub mod record {
     pub use crate::record::{
@@ -98,8 +98,8 @@ pub mod solvers {
         QpSolver, Reason, Solver, StartProjection, StartStrategy, Status, Stopping,
         UnsupportedRecord, WeightPath, active_constraints, choose_weight, choose_weight_watched,
         equation_balance, equation_error, equation_rows, fit, fit_from, fit_on_refined_grids,
-        fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
-        predict_validation, timed,
+        fit_with_noise, fit_with_noise_watched, missing_terms, no_response, predict_validation,
+        timed,
     };
 }
 pub mod structure {
@@ -107,9 +107,9 @@ pub mod structure {
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, IdentifiedSystem, Linear, PredictedChannel, PredictedResponse,
-        PredictionSummary, Profile, ProfileSettings, Target, equivalent_coefficients,
-        equivalent_systems, extremes, multistart, predict, prediction, profile, profile_likelihood,
+        Choice, EquivalentSystem, IdentifiedSystem, PredictedChannel, PredictedResponse,
+        PredictionSummary, Profile, ProfileSettings, equivalent_coefficients, equivalent_systems,
+        extremes, multistart, predict, prediction, profile, profile_likelihood,
     };
 }
 pub mod system {

@@ -17,7 +17,7 @@ pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 use place::Place;
 pub use refinement::AutomaticGrid;
-pub use study::{StudyPlan, StudyTarget};
+pub use study::StudyPlan;
 
 use super::key_positions::{key_path, locate};
 use super::{ModelFile, ModelSource};

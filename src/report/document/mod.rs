@@ -5,9 +5,7 @@ mod estimates;
 mod fit_summaries;
 mod verdict;
 
-pub use channel::{
-    ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
-};
+pub use channel::{ChannelSummary, IgnoredSummary, NoiseSummary, ValidationSummary};
 pub use estimates::Estimates;
 pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
 pub use verdict::{Verdict, level_in_words};
@@ -20,9 +18,9 @@ use kmcfit_core::internals::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::ClassificationKind;
-use kmcfit_core::internals::identifiability::CovarianceKind;
-use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status, number_or_nan};
+use kmcfit_core::internals::identifiability::{ClassificationKind, CovarianceKind, Quantity};
+use kmcfit_core::internals::number_format::number_or_nan;
+use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status};
 pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
@@ -100,7 +98,7 @@ pub struct ResultDocument {
     pub validation: Vec<ValidationSummary>,
     /// Estimated initial states and sensor parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub nuisance_parameters: Vec<NuisanceParameter>,
+    pub nuisance_parameters: Vec<Quantity>,
     /// Statistics of all samples.
     #[serde(default)]
     pub statistics: FitStatistics,

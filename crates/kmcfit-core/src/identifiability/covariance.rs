@@ -53,7 +53,7 @@ impl Information {
     pub fn new(problem: &Problem, theta: &[f64], sensitivity: Sensitivity) -> Self {
         let directions = &sensitivity.directions;
         let priors = problem.functions.priors();
-        let row = |(j, prior): (usize, Prior)| directions.row([(j, 1.0 / prior.sigma)].into_iter());
+        let row = |(j, prior): (usize, Prior)| directions.row([(j, 1.0 / prior.sigma)]);
         let priors: Vec<Vec<f64>> = priors.map(row).collect();
         let n = directions.len();
         let priors = DMatrix::from_fn(priors.len(), n, |i, k| priors[i][k]);
