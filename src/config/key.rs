@@ -1,7 +1,10 @@
-//! Keys of a model file: meaning, kind of value, unit, default and an example of each.
-//!
-//! `keys!` (`map.rs`) declares the struct that reads a map together with this documentation, from which `kmcfit explain` and
-//! the JSON schema are generated.
+//! Keys of a model file: meaning, kind of value, unit, default and an example of each, from the schema of the types that read it.
+
+use kmcfit_core::model::ModelSpec;
+use schemars::generate::SchemaSettings;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 /// Type of a value.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +40,8 @@ pub struct KeyGroup {
     pub name: &'static str,
     /// Meaning of the map, as a sentence.
     pub text: &'static str,
+    /// What is expected where it is no map.
+    pub expecting: &'static str,
     /// Its keys, in the order of declaration.
     pub keys: &'static [KeyDoc],
 }
@@ -74,4 +79,118 @@ impl ValueType {
             _ => Vec::new(),
         }
     }
+}
+
+/// The keys of a model.
+pub fn model() -> &'static KeyGroup {
+    static MODEL: LazyLock<&KeyGroup> = LazyLock::new(|| {
+        let generator = SchemaSettings::draft2020_12().into_generator();
+        let root = generator.into_root_schema_for::<ModelSpec>().to_value();
+        let root = &*Box::leak(Box::new(root));
+        let mut keys = Keys {
+            definitions: root["$defs"].as_object(),
+            groups: BTreeMap::new(),
+        };
+        keys.group("model", root)
+    });
+    *MODEL
+}
+
+/// Reads the keys out of a schema, which lives as long as the program.
+struct Keys {
+    definitions: Option<&'static Map<String, Value>>,
+    groups: BTreeMap<&'static str, &'static KeyGroup>,
+}
+
+impl Keys {
+    /// The keys of a map, once for each name.
+    fn group(&mut self, name: &'static str, schema: &'static Value) -> &'static KeyGroup {
+        if let Some(group) = self.groups.get(name) {
+            return group;
+        }
+        let required = schema["required"].as_array();
+        let is_required =
+            |name: &str| required.is_some_and(|all| all.iter().any(|key| key == name));
+        let properties = schema["properties"].as_object().into_iter().flatten();
+        let keys = properties.map(|(name, key)| {
+            let fact = |fact: &str| key.get(fact).and_then(Value::as_str);
+            KeyDoc {
+                name,
+                kind: self.kind(key),
+                text: words_of(key),
+                example: fact("example").unwrap_or_default(),
+                unit: fact("unit"),
+                default: fact("default"),
+                range: fact("range"),
+                needs: fact("needs"),
+                required: is_required(name),
+            }
+        });
+        let keys = keys.collect::<Vec<_>>().leak();
+        let group = &*Box::leak(Box::new(KeyGroup {
+            name,
+            text: words_of(schema),
+            expecting: schema["expecting"].as_str().unwrap_or("a map"),
+            keys,
+        }));
+        self.groups.insert(name, group);
+        group
+    }
+
+    /// The type of a value.
+    fn kind(&mut self, schema: &'static Value) -> ValueType {
+        if let Some(path) = schema["$ref"].as_str() {
+            let name = path.rsplit('/').next().unwrap_or_default();
+            let found = self.definitions.and_then(|all| all.get(name));
+            return match found {
+                Some(map) if map.get("properties").is_some() => {
+                    ValueType::Map(self.group(name, map))
+                }
+                Some(other) => self.kind(other),
+                None => ValueType::Text,
+            };
+        }
+        let list = |name: &str| schema[name].as_array().into_iter().flatten();
+        if schema.get("column").is_some() {
+            return ValueType::Column;
+        }
+        if let Some(word) = schema.get("const") {
+            return word.as_str().map_or(ValueType::Format, ValueType::Word);
+        }
+        if schema.get("oneOf").is_some() {
+            let words =
+                list("oneOf").map(|word| (word["const"].as_str().unwrap_or(""), words_of(word)));
+            return ValueType::Choice(words.collect::<Vec<_>>().leak());
+        }
+        if schema.get("anyOf").is_some() {
+            let mut kinds = Vec::new();
+            // An optional value may be null as well; a fixed word has a null type beside it.
+            let is_null = |one: &&Value| one["type"] == "null" && one.get("const").is_none();
+            for one in list("anyOf").filter(|one| !is_null(one)) {
+                match self.kind(one) {
+                    ValueType::AnyOf(inner) => kinds.extend(inner),
+                    other => kinds.push(other),
+                }
+            }
+            return match kinds.as_slice() {
+                [one] => *one,
+                _ => ValueType::AnyOf(kinds.leak()),
+            };
+        }
+        // The first type of an optional value is its own.
+        let kind = schema["type"].as_str().or(schema["type"][0].as_str());
+        match kind.unwrap_or_default() {
+            "number" => ValueType::Number,
+            "integer" => ValueType::Count,
+            "boolean" => ValueType::Bool,
+            "array" => ValueType::List(Box::leak(Box::new(self.kind(&schema["items"])))),
+            _ => ValueType::Text,
+        }
+    }
+}
+
+/// The description of a schema in one line.
+fn words_of(schema: &'static Value) -> &'static str {
+    let text = schema["description"].as_str().unwrap_or_default();
+    text.replace('\n', " ").leak()
 }

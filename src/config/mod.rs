@@ -1,18 +1,15 @@
 //! The model file. All uses of YAML are in this module.
 //!
-//! [`ModelFile::read`] parses a file into a [`ModelSpec`](spec::ModelSpec), with one field for each key. Errors of
+//! [`ModelFile::read`] parses a file into a [`ModelSpec`](kmcfit_core::model::ModelSpec), with one field for each key. Errors of
 //! syntax, spelling and type are reported here with file, line, column and key. [`build()`] checks the values against
 //! each other and reports errors at the line of a key by [`ModelFile::error_at`].
 
-pub mod alternatives;
-mod choice;
 mod dominant;
 mod input_limits;
 pub mod key;
 pub mod key_documentation;
 pub mod key_positions;
 mod lowering;
-mod map;
 mod model_file;
 mod new_record;
 mod overrides;
@@ -21,9 +18,7 @@ mod retired;
 mod run_settings;
 mod scaffold;
 mod source;
-pub mod spec;
 mod syntax;
-pub mod values;
 mod yaml_errors;
 
 pub use lowering::{
@@ -36,4 +31,3 @@ pub use overrides::Override;
 pub use run_settings::{RunSensor, SensorValue};
 pub use scaffold::{Role, Scaffold, Source, Statements, rate, recognised, scaffold};
 pub use source::{DataFile, ModelSource};
-pub use values::{Number, NumberOrColumn, Text};

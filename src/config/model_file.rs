@@ -7,14 +7,13 @@ use std::sync::Arc;
 use super::input_limits::{Checked, LONGEST_MODEL};
 use super::key_positions::{key_path, locate, place};
 use super::overrides::Override;
-use super::spec::ModelSpec;
-use super::values::Text;
 use super::yaml_errors;
 use crate::digest::ReadFiles;
 use crate::error::InputError;
 use crate::formats::has_data_extension;
 use crate::tables::{TABLE, Table, TableFormat};
 use crate::text_io::{LONGEST_TABLE, read_text};
+use kmcfit_core::model::ModelSpec;
 
 /// Expected contents of a model file, for messages.
 const MODEL_FILE: &str = "a model file (YAML)";
@@ -132,7 +131,7 @@ impl ModelFile {
     #[must_use]
     pub fn with_record(mut self, name: &str, content: Arc<[u8]>) -> Self {
         if let Some(experiment) = self.spec.experiments.first_mut() {
-            experiment.data = Some(Text(name.to_owned()));
+            experiment.data = Some(name.to_owned());
         }
         self.files.insert(name.to_owned(), content);
         self
@@ -249,7 +248,7 @@ impl ModelFile {
     /// Name of experiment `i` in reports.
     pub(super) fn experiment_name(&self, i: usize) -> String {
         let given = self.spec.experiments[i].name.as_ref();
-        given.map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone())
+        given.map_or_else(|| format!("experiment {}", i + 1), |name| name.clone())
     }
 
     /// An error about an argument, moved to the key of the model that supplies it.

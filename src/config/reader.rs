@@ -1,15 +1,15 @@
-//! Deserialisation of values from YAML with typed errors.
+//! Checks keys and types of a model file against its schema, with typed errors.
 //!
 //! The YAML crate reports errors as text with a position. A visitor therefore stores its typed [`Mistake`] in a
 //! [`Report`], together with the path of the current key, and raises a placeholder error, to which the crate adds the
-//! position.
+//! position. What passes is read by serde.
 
 use super::key::{KeyDoc, ValueType};
-use crate::text_io::quote;
+use crate::spelling::{did_you_mean, integer_in, number_in};
+use crate::text_io::{one_of, quote};
 use serde::de::{DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::cell::RefCell;
 use std::fmt;
-use std::marker::PhantomData;
 
 /// A YAML node; lists, maps and tags without their contents.
 #[derive(Debug, Clone, Copy)]
@@ -87,14 +87,6 @@ pub(super) enum Mistake {
 }
 
 impl Mistake {
-    /// Replaces the description of accepted values.
-    pub fn expecting(mut self, change: impl FnOnce(&str) -> String) -> Self {
-        if let Self::Value { expected, .. } = &mut self {
-            *expected = change(expected);
-        }
-        self
-    }
-
     /// Adds a suggestion.
     pub fn suggest(mut self, suggestion: Option<String>) -> Self {
         if let Self::Value { hint, .. } = &mut self {
@@ -134,158 +126,7 @@ impl Report {
         self.path.borrow_mut().truncate(above);
         Ok(value)
     }
-
-    /// Reads the next key of a map.
-    pub fn key<'de, A: MapAccess<'de>>(
-        &self,
-        map: &mut A,
-        keys: &'static [KeyDoc],
-    ) -> Result<Option<&'static str>, A::Error> {
-        map.next_key_seed(NextKey { keys, report: self })
-    }
-
-    /// Reads the value of a key into its field.
-    pub fn field<'de, T: Value, A: MapAccess<'de>>(
-        &self,
-        map: &mut A,
-        key: &'static str,
-        field: &mut Option<T>,
-    ) -> Result<(), A::Error> {
-        if field.is_some() {
-            return Err(self.raise(Mistake::RepeatedKey(key)));
-        }
-        let value = || map.next_value_seed(ValueVisitor::new(self));
-        *field = Some(self.below(&format!(".{key}"), value)?);
-        Ok(())
-    }
-
-    /// The value of a field, or the value for an absent key.
-    pub fn required<T: Value, E: Error>(
-        &self,
-        field: Option<T>,
-        key: &'static str,
-    ) -> Result<T, E> {
-        let value = field.map_or_else(|| T::absent(key), Ok);
-        value.map_err(|mistake| self.raise(mistake))
-    }
-
-    /// Reads the elements of a list.
-    pub fn elements<'de, T: Value, A: SeqAccess<'de>>(
-        &self,
-        mut list: A,
-    ) -> Result<Vec<T>, A::Error> {
-        let mut elements = Vec::new();
-        let mut next = |i| {
-            self.below(&format!("[{i}]"), || {
-                list.next_element_seed(ValueVisitor::new(self))
-            })
-        };
-        while let Some(element) = next(elements.len())? {
-            elements.push(element);
-        }
-        Ok(elements)
-    }
 }
-
-/// A type of values in a model file.
-pub(super) trait Value: Sized {
-    /// Type of the value in the schema.
-    const KIND: ValueType;
-    /// True for a required key.
-    const REQUIRED: bool = true;
-
-    /// The value for an absent key.
-    fn absent(key: &'static str) -> Result<Self, Mistake> {
-        Err(Mistake::MissingKey(key))
-    }
-
-    /// The value from a scalar, or the error; called for lists and maps as well if the type accepts none.
-    fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake>;
-
-    /// The value from a list.
-    fn list<'de, A: SeqAccess<'de>>(_: A, report: &Report) -> Result<Self, A::Error> {
-        Self::scalar(Scalar::List).map_err(|mistake| report.raise(mistake))
-    }
-
-    /// The value from a map.
-    fn map<'de, A: MapAccess<'de>>(_: A, report: &Report) -> Result<Self, A::Error> {
-        Self::scalar(Scalar::Map).map_err(|mistake| report.raise(mistake))
-    }
-
-    /// The value from a YAML node of any type.
-    fn read<'de, D: Deserializer<'de>>(
-        reader: ValueVisitor<'_, Self>,
-        from: D,
-    ) -> Result<Self, D::Error> {
-        from.deserialize_any(reader)
-    }
-}
-
-impl<T: Value> Value for Option<T> {
-    const KIND: ValueType = T::KIND;
-    const REQUIRED: bool = false;
-    fn absent(_: &'static str) -> Result<Self, Mistake> {
-        Ok(None)
-    }
-    fn scalar(_: Scalar<'_>) -> Result<Self, Mistake> {
-        Ok(None)
-    }
-    fn read<'de, D: Deserializer<'de>>(
-        reader: ValueVisitor<'_, Self>,
-        from: D,
-    ) -> Result<Self, D::Error> {
-        from.deserialize_option(Optional(reader.report, PhantomData))
-    }
-}
-
-impl<T: Value> Value for Vec<T> {
-    const KIND: ValueType = ValueType::List(&T::KIND);
-    fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        match scalar {
-            Scalar::Nothing => Ok(Self::new()),
-            other => Err(other.wrong_kind("a list: lines that begin with `- `, or [ … ]")),
-        }
-    }
-    fn list<'de, A: SeqAccess<'de>>(list: A, report: &Report) -> Result<Self, A::Error> {
-        report.elements(list)
-    }
-}
-
-impl Value for bool {
-    const KIND: ValueType = ValueType::Bool;
-    fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        match scalar {
-            Scalar::Bool(value) => Ok(value),
-            other => Err(other.wrong_kind("true or false")),
-        }
-    }
-}
-
-/// Visitor of a value.
-pub(super) struct ValueVisitor<'a, T> {
-    report: &'a Report,
-    value: PhantomData<T>,
-}
-
-impl<'a, T: Value> ValueVisitor<'a, T> {
-    /// A visitor that stores its errors in `report`.
-    pub fn new(report: &'a Report) -> Self {
-        let value = PhantomData;
-        Self { report, value }
-    }
-
-    fn scalar<E: Error>(self, scalar: Scalar<'_>) -> Result<T, E> {
-        T::scalar(scalar).map_err(|mistake| self.report.raise(mistake))
-    }
-}
-
-impl<'de, T: Value> DeserializeSeed<'de> for ValueVisitor<'_, T> {
-    type Value = T;
-    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<T, D::Error> {
-        T::read(self, from)
-    }
-}
-
 /// Implements the scalar methods of a visitor by its method `scalar`.
 macro_rules! scalar_visits {
     ($result:ty) => {
@@ -321,50 +162,142 @@ macro_rules! scalar_visits {
 }
 pub(super) use scalar_visits;
 
-impl<'de, T: Value> Visitor<'de> for ValueVisitor<'_, T> {
-    type Value = T;
+/// A value of a type, or nothing in its place.
+#[derive(Clone, Copy)]
+pub(super) struct Typed<'a> {
+    pub kind: ValueType,
+    pub is_optional: bool,
+    pub report: &'a Report,
+}
+
+impl<'a> Typed<'a> {
+    fn scalar<E: Error>(self, found: Scalar<'_>) -> Result<(), E> {
+        match (found, self.is_optional) {
+            (Scalar::Nothing, true) => Ok(()),
+            _ => scalar(self.kind, found).map_err(|mistake| self.report.raise(mistake)),
+        }
+    }
+
+    /// The alternatives of its type.
+    fn kinds(&self) -> &[ValueType] {
+        match &self.kind {
+            ValueType::AnyOf(kinds) => kinds,
+            one => std::slice::from_ref(one),
+        }
+    }
+
+    fn of(self, kind: ValueType, is_optional: bool) -> Self {
+        Self {
+            kind,
+            is_optional,
+            ..self
+        }
+    }
+}
+
+impl<'de> DeserializeSeed<'de> for Typed<'_> {
+    type Value = ();
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<(), D::Error> {
+        match self.kind {
+            _ if self.is_optional => from.deserialize_option(self),
+            // As text, so that a name such as 12 or 1.50 keeps its spelling.
+            ValueType::Text => from.deserialize_str(self),
+            _ => from.deserialize_any(self),
+        }
+    }
+}
+
+impl<'de> Visitor<'de> for Typed<'_> {
+    type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("text")
     }
 
-    scalar_visits!(T);
+    scalar_visits!(());
 
-    fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<T, A::Error> {
+    fn visit_some<D: Deserializer<'de>>(self, from: D) -> Result<(), D::Error> {
+        self.of(self.kind, false).deserialize(from)
+    }
+
+    fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<(), A::Error> {
         self.scalar(Scalar::Tag)
     }
-    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<T, A::Error> {
-        T::list(list, self.report)
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        let mut kinds = self.kinds().iter();
+        let inner = kinds.find_map(|kind| match kind {
+            ValueType::List(inner) => Some(**inner),
+            _ => None,
+        });
+        let Some(inner) = inner else {
+            return self.scalar(Scalar::List);
+        };
+        let element = self.of(inner, false);
+        for i in 0.. {
+            let next = || list.next_element_seed(element);
+            if self.report.below(&format!("[{i}]"), next)?.is_none() {
+                break;
+            }
+        }
+        Ok(())
     }
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
-        T::map(map, self.report)
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let mut kinds = self.kinds().iter();
+        let group = kinds.find_map(|kind| match kind {
+            ValueType::Map(group) => Some(*group),
+            _ => None,
+        });
+        let Some(group) = group else {
+            return self.scalar(Scalar::Map);
+        };
+        let (keys, report) = (group.keys, self.report);
+        let mut read = vec![false; keys.len()];
+        while let Some(i) = map.next_key_seed(NextKey { keys, report })? {
+            let key = &keys[i];
+            if std::mem::replace(&mut read[i], true) {
+                return Err(report.raise(Mistake::RepeatedKey(key.name)));
+            }
+            let value = || map.next_value_seed(self.of(key.kind, !key.required));
+            report.below(&format!(".{}", key.name), value)?;
+        }
+        let missing = keys
+            .iter()
+            .zip(read)
+            .find(|(key, read)| key.required && !read);
+        match missing {
+            Some((key, _)) => Err(report.raise(Mistake::MissingKey(key.name))),
+            None => Ok(()),
+        }
     }
 }
 
-/// Visitor of a key of a map.
+/// Visitor of a key of a map; gives its index.
 struct NextKey<'a> {
     keys: &'static [KeyDoc],
     report: &'a Report,
 }
 
 impl<'de> DeserializeSeed<'de> for NextKey<'_> {
-    type Value = &'static str;
-    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<&'static str, D::Error> {
+    type Value = usize;
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<usize, D::Error> {
         from.deserialize_str(self)
     }
 }
 
 impl Visitor<'_> for NextKey<'_> {
-    type Value = &'static str;
+    type Value = usize;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a key")
     }
 
     // An error raised in this visit has the position of the key.
-    fn visit_str<E: Error>(self, written: &str) -> Result<&'static str, E> {
+    fn visit_str<E: Error>(self, written: &str) -> Result<usize, E> {
         let mut names = self.keys.iter().map(|key| key.name);
-        names.clone().find(|name| *name == written).ok_or_else(|| {
+        let place = names.clone().position(|name| name == written);
+        place.ok_or_else(|| {
             self.report.raise(Mistake::UnknownKey {
                 key: written.to_owned(),
                 known: names.by_ref().collect(),
@@ -373,21 +306,136 @@ impl Visitor<'_> for NextKey<'_> {
     }
 }
 
-/// Visitor of an optional value.
-struct Optional<'a, T>(&'a Report, PhantomData<T>);
-
-impl<'de, T: Value> Visitor<'de> for Optional<'_, T> {
-    type Value = Option<T>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a value")
+/// Error for a scalar that is not of a type; called for lists and maps as well if the type accepts none.
+fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<(), Mistake> {
+    let refused = |problem| Err(found.refused(problem, expected(kind)));
+    match (kind, found) {
+        (ValueType::Format, Scalar::Integer(1)) => Ok(()),
+        (ValueType::Format, Scalar::Integer(_)) => Err(found
+            .refused("this format version is not supported", "1")
+            .suggest(Some("a newer version of kmcfit may read it".to_owned()))),
+        (ValueType::Format, _) => refused("not a format number"),
+        (ValueType::Number, Scalar::Integer(_)) => Ok(()),
+        (ValueType::Number, Scalar::Float(value)) if value.is_finite() => Ok(()),
+        (ValueType::Number, Scalar::Float(_)) => refused("not a finite number"),
+        (ValueType::Number, Scalar::Text(text)) => Err(found
+            .refused("not a number", expected(kind))
+            .suggest(number_in(text))),
+        (ValueType::Number, _) => refused("not a number"),
+        (ValueType::Count, Scalar::Integer(value)) if value < 0 => {
+            refused("a count cannot be negative")
+        }
+        (ValueType::Count, Scalar::Integer(value)) => match usize::try_from(value) {
+            Ok(_) => Ok(()),
+            Err(_) => refused("the number is too large"),
+        },
+        (ValueType::Count, Scalar::Float(value))
+            if value.fract() == 0.0 && (0.0..1e15).contains(&value) =>
+        {
+            Err(found
+                .refused("not an integer", expected(kind))
+                .suggest(Some(format!("write {value}"))))
+        }
+        (ValueType::Count, Scalar::Text(text)) => Err(found
+            .refused("not an integer", expected(kind))
+            .suggest(integer_in(text))),
+        (ValueType::Count, _) => refused("not an integer"),
+        (ValueType::Text | ValueType::Column, Scalar::Text("") | Scalar::Nothing) => {
+            Err(Scalar::Nothing.refused("the text is empty", expected(kind)))
+        }
+        (ValueType::Text | ValueType::Column, Scalar::Text(_)) => Ok(()),
+        (ValueType::Text, _) => refused("not a text"),
+        (ValueType::Column, Scalar::Integer(number)) => match usize::try_from(number) {
+            Ok(number) if number > 0 => Ok(()),
+            _ => refused("columns are counted from 1"),
+        },
+        (ValueType::Column, _) => refused("not a column"),
+        (ValueType::Bool, Scalar::Bool(_)) => Ok(()),
+        (ValueType::Word(word), Scalar::Text(text)) if text == word => Ok(()),
+        (ValueType::Word(word), Scalar::Text(text)) => Err(found
+            .wrong_kind(expected(kind))
+            .suggest(did_you_mean(text, [word]))),
+        (ValueType::Choice(words), Scalar::Text(text)) => {
+            let names = || words.iter().map(|(name, _)| *name);
+            match names().any(|name| name == text) {
+                true => Ok(()),
+                false => Err(Mistake::Value {
+                    problem: "unknown choice",
+                    found: quote(text),
+                    expected: expected(kind),
+                    hint: did_you_mean(text, names()),
+                }),
+            }
+        }
+        (ValueType::Choice(_), _) => refused("not one of the choices"),
+        (ValueType::AnyOf(kinds), _) => any_of(kinds, found),
+        _ => Err(found.wrong_kind(expected(kind))),
     }
+}
 
-    fn visit_none<E: Error>(self) -> Result<Option<T>, E> {
-        Ok(None)
+/// Error for a scalar that is of none of several types: that of the first, for a word that of its choice, with what all of them expect.
+fn any_of(kinds: &'static [ValueType], found: Scalar<'_>) -> Result<(), Mistake> {
+    let has_word = matches!(kinds[0], ValueType::Number)
+        && kinds.iter().any(|kind| matches!(kind, ValueType::Word(_)));
+    let mut first = None;
+    for kind in kinds {
+        let is_word = matches!((kind, found), (ValueType::Choice(_), Scalar::Text(text)) if number_in(text).is_none());
+        match scalar(*kind, found) {
+            Ok(()) => return Ok(()),
+            Err(mistake) if is_word || first.is_none() => first = Some(mistake),
+            Err(_) => {}
+        }
     }
+    let Some(mut mistake) = first else {
+        return Ok(());
+    };
+    if let Mistake::Value {
+        problem,
+        expected,
+        hint,
+        ..
+    } = &mut mistake
+    {
+        *expected = self::expected(ValueType::AnyOf(kinds));
+        if has_word && matches!(found, Scalar::Text(text) if number_in(text).is_none()) {
+            *problem = "neither a number nor a known word";
+        }
+        if let Scalar::Text(text) = found {
+            let words = kinds.iter().flat_map(|kind| match kind {
+                ValueType::Word(word) => vec![*word],
+                ValueType::Choice(words) => words.iter().map(|(name, _)| *name).collect(),
+                _ => Vec::new(),
+            });
+            *hint = hint.take().or_else(|| did_you_mean(text, words));
+        }
+    }
+    Err(mistake)
+}
 
-    fn visit_some<D: Deserializer<'de>>(self, from: D) -> Result<Option<T>, D::Error> {
-        T::read(ValueVisitor::new(self.0), from).map(Some)
+/// What is accepted, in words.
+fn expected(kind: ValueType) -> String {
+    match kind {
+        ValueType::Format => "1".into(),
+        ValueType::Number => "a finite number".into(),
+        ValueType::Count => "an integer, 0 or more".into(),
+        ValueType::Text => "text".into(),
+        ValueType::Bool => "true or false".into(),
+        ValueType::Column => "the name of a column, or its number from 1".into(),
+        ValueType::Word(word) => format!("`{word}`"),
+        ValueType::Choice(words) => one_of(words.iter().map(|(name, _)| *name)),
+        ValueType::Map(group) => group.expecting.into(),
+        ValueType::List(ValueType::Number) => "a list of numbers".into(),
+        ValueType::List(_) => "a list: lines that begin with `- `, or [ … ]".into(),
+        ValueType::AnyOf(kinds) => {
+            let is_both = kinds.len() == 2 && matches!(kinds[1], ValueType::List(_));
+            match is_both {
+                true => format!("{}, or a list of them", expected(kinds[0])),
+                false => {
+                    let all: Vec<String> = kinds.iter().map(|kind| expected(*kind)).collect();
+                    let last = all.len() - 1;
+                    format!("{}, or {}", all[..last].join(", "), all[last])
+                }
+            }
+        }
     }
 }

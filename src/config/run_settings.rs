@@ -1,15 +1,15 @@
 //! What the model of a run states about its records, for a new record of the same sensors.
 
 use super::ModelFile;
-use super::alternatives::ScalarOr;
 use super::lowering::sensor_of;
 use super::scaffold::Role;
-use super::spec::{ColumnRef, DelayValue, EstimateValue, ExperimentSpec, SensorKeys};
-use super::values::{ColumnId, NumberOrEstimate, Text};
 use crate::tables::{ColumnName, Table};
 use crate::units::ScaledUnit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::Interpolation;
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::{ColumnId, NumberOrEstimate};
+use kmcfit_core::model::{ColumnRef, DelayValue, EstimateValue, ExperimentSpec, SensorKeys};
 
 /// Settings of the first record of a run with a given input; those of an ideal sensor by default.
 #[derive(Debug, Clone, Default)]
@@ -94,7 +94,7 @@ impl RunSettings {
 
     /// Sampling rate of a record without a column of times, Hz.
     pub fn sample_rate(&self) -> Option<f64> {
-        self.experiment.as_ref()?.sample_rate.map(|rate| rate.0)
+        self.experiment.as_ref()?.sample_rate
     }
 
     /// Columns of a table with the names that the model gives, by index.
@@ -129,7 +129,7 @@ impl RunSettings {
         let Some(units) = self.experiment.as_ref().and_then(|s| s.units.as_ref()) else {
             return Vec::new();
         };
-        let stated: [(Role, &Option<Text>); 7] = [
+        let stated: [(Role, &Option<String>); 7] = [
             (Role::Time, &units.time),
             (Role::Displacement, &units.displacement),
             (Role::Velocity, &units.velocity),
@@ -139,7 +139,7 @@ impl RunSettings {
             (Role::BaseDisplacement, &units.base_displacement),
         ];
         let parsed = stated.into_iter().filter_map(|(role, text)| {
-            let unit = ScaledUnit::parse(role.kind(), &text.as_ref()?.0, None).ok()?;
+            let unit = ScaledUnit::parse(role.kind(), text.as_ref()?, None).ok()?;
             Some((role, unit))
         });
         parsed.collect()
@@ -155,7 +155,7 @@ impl RunSettings {
                 .and_then(pick)
             {
                 None => SensorValue::Known(default),
-                Some(ScalarOr::Scalar(NumberOrEstimate::Number(x))) => SensorValue::Known(x.0),
+                Some(ScalarOr::Scalar(NumberOrEstimate::Number(x))) => SensorValue::Known(*x),
                 Some(_) => SensorValue::Estimated(name(part)),
             };
         let (input, input_delay) = self.input_delay();
@@ -193,7 +193,7 @@ impl RunSettings {
 fn delay(given: Option<&DelayValue>, name: impl Fn() -> String) -> SensorValue {
     match given {
         None => SensorValue::Known(0.0),
-        Some(ScalarOr::Scalar(NumberOrEstimate::Number(x))) => SensorValue::Known(x.0),
+        Some(ScalarOr::Scalar(NumberOrEstimate::Number(x))) => SensorValue::Known(*x),
         Some(_) => SensorValue::Estimated(name()),
     }
 }

@@ -3,25 +3,36 @@
 use std::path::Path;
 
 use super::input_limits::Checked;
+use super::key::{ValueType, model};
 use super::key_positions::place;
 use super::key_positions::{self, Position, key_path, locate};
-use super::reader::{Mistake, Report, Value, ValueVisitor};
+use super::reader::{Mistake, Report, Typed};
 use super::retired::successor;
 use super::syntax;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
+use kmcfit_core::model::ModelSpec;
+use serde::Deserialize;
 use serde::de::DeserializeSeed;
 
 /// Reads the keys of a file.
 ///
 /// An error of syntax takes precedence, because it can cause apparent errors in the values before it.
-pub(super) fn read<T: Value>(file: &Path, checked: &Checked) -> Result<T, InputError> {
+pub(super) fn read(file: &Path, checked: &Checked) -> Result<ModelSpec, InputError> {
     let text = checked.text();
     let report = Report::default();
-    ValueVisitor::new(&report)
-        .deserialize(serde_yaml::Deserializer::from_str(text))
-        .map_err(|error| input_error(file, text, &error, report))
+    let keys = Typed {
+        kind: ValueType::Map(model()),
+        is_optional: false,
+        report: &report,
+    };
+    let document = || serde_yaml::Deserializer::from_str(text);
+    match keys.deserialize(document()) {
+        Ok(()) => ModelSpec::deserialize(document())
+            .map_err(|error| input_error(file, text, &error, Report::default())),
+        Err(error) => Err(input_error(file, text, &error, report)),
+    }
 }
 
 fn input_error(file: &Path, text: &str, error: &serde_yaml::Error, report: Report) -> InputError {

@@ -32,7 +32,7 @@ impl FleetIdentity {
     fn of(model: &ModelFile) -> Self {
         let mut content = model.effective_text().to_owned();
         let record = model.spec.experiments.first().and_then(|e| e.data.as_ref());
-        let record = record.map(|name| model.resolve(&name.0));
+        let record = record.map(|name| model.resolve(name));
         let others = model.data_files().into_iter();
         for path in others.filter(|path| Some(path) != record.as_ref()) {
             // A file that cannot be read is the error of the fits.

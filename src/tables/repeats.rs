@@ -3,20 +3,9 @@
 use super::Table;
 use super::times::not_increasing;
 use crate::error::InputError;
+pub use kmcfit_core::model::Duplicates;
 use std::borrow::Cow;
 use std::ops::Range;
-
-/// Treatment of rows that repeat a time with other values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Duplicates {
-    /// An error.
-    #[default]
-    Error,
-    /// The first of the rows.
-    First,
-    /// The mean of the rows.
-    Mean,
-}
 
 /// Most times that a message lists.
 const LISTED: usize = 10;

@@ -2,7 +2,6 @@
 //! any bytes. The tests run them on the corpus and on mutations of it; `fuzz/` runs the same functions.
 
 use kmcfit::Run;
-use kmcfit::config::values::{Count, Nodes};
 use kmcfit::config::{BuildMode, ModelFile, Override, build};
 use kmcfit::error::InputError;
 use kmcfit::fitting::fit_model;
@@ -12,6 +11,7 @@ use kmcfit::results::OutputFolder;
 use kmcfit::tables::{ColumnName, Table, TableFormat, times};
 use kmcfit_core::internals::solvers::Observer;
 use kmcfit_core::internals::system::State;
+use kmcfit_core::model::Nodes;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -198,9 +198,9 @@ pub fn model(bytes: &[u8]) -> Verdict {
     file.data_files();
     if let Some(grid) = &mut file.spec.grid
         && let Some(Nodes::Count(count)) = &mut grid.nodes
-        && (MANY_NODES..TOO_MANY_NODES).contains(&count.0)
+        && (MANY_NODES..TOO_MANY_NODES).contains(count)
     {
-        *count = Count(MANY_NODES);
+        *count = MANY_NODES;
     }
     let purposes = [BuildMode::Fit, BuildMode::Simulate { nodes: Some(21) }];
     let mut verdict = Verdict::Accepted;

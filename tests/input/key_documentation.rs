@@ -4,7 +4,7 @@
     reason = "the texts are those of the project"
 )]
 
-use kmcfit::config::key_documentation::{self, KeyGroup, MODEL, ValueType};
+use kmcfit::config::key_documentation::{self, KeyGroup, ValueType, model};
 use kmcfit::config::{ModelFile, Override};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -97,7 +97,7 @@ fn descend(
 #[test]
 fn reader_and_registry_know_the_same_keys_and_examples_are_read() {
     let mut seen = BTreeSet::new();
-    visit(MODEL, "", &base(), &mut seen);
+    visit(model(), "", &base(), &mut seen);
     assert!(seen.len() > 120, "{}", seen.len());
     let all = key_documentation::all();
     assert!(all.len() <= seen.len(), "{} {}", all.len(), seen.len());

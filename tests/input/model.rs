@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
-use kmcfit::config::alternatives::ScalarOr;
-use kmcfit::config::spec::{
-    BasisName, ByCoefficient, FitMethod, FunctionSpec, GradientName, InitialSpec, PenaltyKeys,
-    PenaltyKind, Shared, StepMethod, WeightRuleName,
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::{
+    BasisName, ByCoefficient, FitMethod, FunctionSpec, InitialSpec, PenaltyKeys, PenaltyKind,
+    Shared, WeightRuleName,
 };
-use kmcfit::config::values::{
-    Bound, ColumnId, Count, KnotSpec, KnownValue, Nodes, Number, NumberOrColumn, NumberOrEstimate,
-    Sigma, StartSpec, Weight,
+use kmcfit_core::model::{
+    Bound, ColumnId, KnotSpec, KnownValue, Nodes, NumberOrColumn, NumberOrEstimate, SigmaValue,
+    StartSpec, WeightChoice,
 };
-use kmcfit_core::CoefficientKind;
+use kmcfit_core::{CoefficientKind, GradientKind, Method};
 
 pub const FULL: &str = "\
 format: 1
@@ -75,15 +75,15 @@ fn every_key_is_read() {
         Some(ScalarOr::Scalar(ColumnId::Name("y_m".into())))
     );
     let sigma = first.sigma.as_ref().unwrap().displacement.clone();
-    assert_eq!(sigma, Some(Sigma::Number(Number(0.1))));
+    assert_eq!(sigma, Some(SigmaValue::Number(0.1)));
     assert_eq!(known(&first.initial)[1], 1.0);
     assert_eq!(second.name, None);
     assert_eq!(known(&second.initial), [-2e-3, 0.5]);
 
     let grid = spec.grid.unwrap();
-    assert_eq!(grid.nodes, Some(Nodes::Count(Count(2000))));
-    assert_eq!(grid.method, Some(StepMethod::Midpoint));
-    assert_eq!(grid.duration.map(|n| n.0), Some(25.0));
+    assert_eq!(grid.nodes, Some(Nodes::Count(2000)));
+    assert_eq!(grid.method, Some(Method::Midpoint));
+    assert_eq!(grid.duration, Some(25.0));
 
     let functions = spec.functions;
     assert_eq!(
@@ -92,7 +92,7 @@ fn every_key_is_read() {
     );
     assert_eq!(
         of(&functions, CoefficientKind::MASS).start,
-        Some(StartSpec::Number(Number(2.0)))
+        Some(StartSpec::Number(2.0))
     );
     let Some(StartSpec::Column(start)) = of(&functions, CoefficientKind::DAMPING).start else {
         panic!("a column")
@@ -103,37 +103,37 @@ fn every_key_is_read() {
     );
     assert_eq!(
         of(&functions, CoefficientKind::STIFFNESS).fixed,
-        Some(KnownValue::Number(Number(1.0)))
+        Some(KnownValue::Number(1.0))
     );
 
     let fit = spec.fit.unwrap();
     assert_eq!(fit.method, Some(FitMethod::Lbfgs));
-    assert_eq!(fit.gradient, Some(GradientName::Continuous));
-    assert_eq!(fit.memory.map(|n| n.0), Some(10));
+    assert_eq!(fit.gradient, Some(GradientKind::Continuous));
+    assert_eq!(fit.memory, Some(10));
     let stop = fit.stop.unwrap();
-    assert_eq!(stop.iterations, Some(Count(1000)));
-    assert_eq!(stop.cost_ratio, Some(Number(1e-4)));
-    assert_eq!(stop.gradient_ratio, Some(Number(1e-4)));
-    assert_eq!(stop.tolerance, Some(Number(1e-10)));
-    assert_eq!(stop.step, Some(Number(1e-12)));
-    assert_eq!(stop.seconds, Some(Number(60.0)));
+    assert_eq!(stop.iterations, Some(1000));
+    assert_eq!(stop.cost_ratio, Some(1e-4));
+    assert_eq!(stop.gradient_ratio, Some(1e-4));
+    assert_eq!(stop.tolerance, Some(1e-10));
+    assert_eq!(stop.step, Some(1e-12));
+    assert_eq!(stop.seconds, Some(60.0));
 
     let truth = spec.truth.unwrap();
     assert_eq!(&*truth.data, "../data/paper_truth.csv");
     let columns = truth.columns.unwrap();
     assert_eq!(
-        columns.get(CoefficientKind::MASS).map(|c| &*c.0),
+        columns.get(CoefficientKind::MASS).map(String::as_str),
         Some("mass_kg")
     );
     assert_eq!(
-        columns.get(CoefficientKind::DAMPING).map(|c| &*c.0),
+        columns.get(CoefficientKind::DAMPING).map(String::as_str),
         Some("damping_N_s_per_m")
     );
     assert_eq!(
-        columns.get(CoefficientKind::STIFFNESS).map(|c| &*c.0),
+        columns.get(CoefficientKind::STIFFNESS).map(String::as_str),
         Some("stiffness_N_per_m")
     );
-    assert_eq!(spec.predict.unwrap()[0].velocity, Number(1.001));
+    assert_eq!(spec.predict.unwrap()[0].velocity, 1.001);
 }
 
 #[test]
@@ -146,10 +146,10 @@ fn shapes_limits_and_penalties_are_read() {
 
     let mass = of(&functions, CoefficientKind::MASS);
     assert_eq!(mass.basis, Some(BasisName::PiecewiseLinear));
-    assert_eq!(mass.knots, Some(KnotSpec::Count(Count(11))));
-    let list = vec![Number(1.0), Number(2.5)];
+    assert_eq!(mass.knots, Some(KnotSpec::Count(11)));
+    let list = vec![1.0, 2.5];
     assert_eq!(mass.start, Some(StartSpec::List(list)));
-    let bound = Bound::At(NumberOrColumn::Number(Number(0.1)));
+    let bound = Bound::At(NumberOrColumn::Number(0.1));
     assert_eq!(mass.min, Some(bound));
     let Some(Bound::At(NumberOrColumn::Column(max))) = mass.max else {
         panic!("a column")
@@ -158,31 +158,35 @@ fn shapes_limits_and_penalties_are_read() {
 
     let damping = of(&functions, CoefficientKind::DAMPING);
     assert_eq!(damping.basis, Some(BasisName::BSpline));
-    let times = [0.0, 1.5, 3.0].map(Number).to_vec();
+    let times = [0.0, 1.5, 3.0].to_vec();
     assert_eq!(damping.knots, Some(KnotSpec::Times(times)));
     let tikhonov = |order, weight, reference| PenaltyKeys {
         kind: PenaltyKind::Tikhonov,
-        order: Some(Count(order)),
+        order: Some(order),
         weight,
         reference,
     };
     let two: Vec<_> = damping.penalty.iter().flat_map(|s| s.iter()).collect();
-    let slope = tikhonov(1, Weight::Rule(WeightRuleName::Discrepancy), None);
+    let slope = tikhonov(1, WeightChoice::Rule(WeightRuleName::Discrepancy), None);
     let variation = PenaltyKeys {
         kind: PenaltyKind::TotalVariation,
         order: None,
-        weight: Weight::Number(Number(2.0)),
+        weight: WeightChoice::Number(2.0),
         reference: None,
     };
     let expected = [("[0]".to_owned(), &slope), ("[1]".to_owned(), &variation)];
     assert_eq!(two, expected);
 
     let stiffness = of(&functions, CoefficientKind::STIFFNESS);
-    assert_eq!(stiffness.degree, Some(Count(3)));
+    assert_eq!(stiffness.degree, Some(3));
     let many: Vec<_> = stiffness.penalty.iter().flat_map(|s| s.iter()).collect();
-    let reference = NumberOrColumn::Number(Number(1.0));
-    let value = tikhonov(0, Weight::Number(Number(1e-3)), Some(reference));
-    let curvature = tikhonov(2, Weight::Rule(WeightRuleName::RestrictedLikelihood), None);
+    let reference = NumberOrColumn::Number(1.0);
+    let value = tikhonov(0, WeightChoice::Number(1e-3), Some(reference));
+    let curvature = tikhonov(
+        2,
+        WeightChoice::Rule(WeightRuleName::RestrictedLikelihood),
+        None,
+    );
     let expected = [("[0]".to_owned(), &value), ("[1]".to_owned(), &curvature)];
     assert_eq!(many, expected);
 }
@@ -239,10 +243,10 @@ fn a_file_is_read_and_paths_start_from_its_folder() {
 
 #[test]
 fn choices_say_their_names() {
-    for (name, method) in FitMethod::ALL {
-        assert_eq!(method.to_string(), *name);
+    for method in FitMethod::ALL {
+        assert_eq!(method.to_string(), method.name());
     }
-    assert_eq!(StepMethod::Rk4.name(), "rk4");
+    assert_eq!(Method::Rk4.name(), "rk4");
 }
 
 /// Displacement and velocity of an initial state that is known.
@@ -251,7 +255,7 @@ fn known(initial: &InitialSpec) -> [f64; 2] {
         panic!("a state")
     };
     [&state.displacement, &state.velocity].map(|value| match value {
-        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => number.0,
+        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => *number,
         other => panic!("{other:?}"),
     })
 }

@@ -184,7 +184,7 @@ fn repeated_keys() {
 #[test]
 fn numbers() {
     assert_snapshot!(changed("velocity: 1}", "velocity: fast}"), @"
-    m.yaml:8:44: experiments[0].initial.velocity: neither a number nor `estimate`
+    m.yaml:8:44: experiments[0].initial.velocity: neither a number nor a known word
       found: text `fast`
       expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
@@ -223,13 +223,13 @@ fn numbers() {
       expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("start: 2.0}", "start: 2.0, min: non}"), @"
-    m.yaml:14:41: functions.mass.min: neither a number nor `none`
+    m.yaml:14:41: functions.mass.min: neither a number nor a known word
       found: text `non`
-      expected: a finite number, `none`, or a column: {data: file.csv, column: name}
+      expected: a finite number, a column: {data: file.csv, column: name}, or `none`
       hint: did you mean `none`?
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: yes}"), @"
-    m.yaml:8:44: experiments[0].initial.velocity: neither a number nor `estimate`
+    m.yaml:8:44: experiments[0].initial.velocity: neither a number nor a known word
       found: text `yes`
       expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
@@ -265,19 +265,19 @@ fn counts() {
     assert_snapshot!(changed("nodes: 2000", "nodes: 2e3"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 2000
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 2000.0"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 2000
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 2.5"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 2.5
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: -3"), @"
     m.yaml:12:15: grid.nodes: a count cannot be negative
@@ -287,28 +287,28 @@ fn counts() {
     assert_snapshot!(changed("nodes: 2000", "nodes: 2_000"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: text `2_000`
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: many"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: text `many`
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 99999999999999999999"), @"
     m.yaml:12:15: grid.nodes: the number is too large
       found: the integer 99999999999999999999
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 9999999999999999999999999999999999999999999"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: the floating-point number 1e43
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: [2000]"), @"
     m.yaml:12:15: grid.nodes: not an integer
       found: a list
-      expected: an integer, or `auto`
+      expected: an integer, 0 or more, or `auto`
     ");
 }
 
@@ -414,12 +414,12 @@ fn wrong_kinds() {
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: [3.3, 1]"), @"
     m.yaml:8:14: experiments[0].initial: wrong type of value
       found: a list
-      expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
+      expected: `estimate`, or a map such as {displacement: 3.3, velocity: 1.0}
     ");
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: true"), @"
     m.yaml:8:14: experiments[0].initial: wrong type of value
       found: the boolean true
-      expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
+      expected: `estimate`, or a map such as {displacement: 3.3, velocity: 1.0}
     ");
     assert_snapshot!(changed("title: Linear mass decay", "title: {a: b}"), @"
     m.yaml:2:8: title: wrong type of value
@@ -439,7 +439,7 @@ fn wrong_kinds() {
     assert_snapshot!(changed("fixed: 1", "fixed: [1, 1]"), @"
     m.yaml:18:39: functions.stiffness.fixed: not a number
       found: a list
-      expected: a finite number, {value: 4.5, sigma: 0.02}, a column: {data: file.csv, column: name}, or for a mass `unknown`
+      expected: a finite number, `unknown`, or {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(changed("data: start.csv", "data:"), @"
     m.yaml:17:17: the file is not valid YAML: a space or a value is missing behind this `:`

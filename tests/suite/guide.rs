@@ -5,7 +5,7 @@
 
 use crate::common::pages::page;
 use crate::common::repository;
-use kmcfit::config::key_documentation::{Found, KeyDoc, KeyGroup, MODEL, ValueType, all};
+use kmcfit::config::key_documentation::{Found, KeyDoc, KeyGroup, ValueType, all, model};
 use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
 use std::fs;
@@ -191,7 +191,7 @@ This page is generated from the source of the reader.
 /// The page of all keys: one section for each map.
 fn key_reference() -> String {
     let keys = all();
-    let mut groups: Vec<&KeyGroup> = vec![MODEL];
+    let mut groups: Vec<&KeyGroup> = vec![model()];
     let nested = keys.iter().flat_map(|found| found.key.kind.groups());
     for group in nested {
         if !groups.iter().any(|known| known.name == group.name) {

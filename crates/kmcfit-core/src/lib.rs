@@ -64,6 +64,7 @@ mod diagnostics;
 mod functions;
 mod host;
 mod identifiability;
+pub mod model;
 mod noise;
 mod number_format;
 mod objective;

@@ -1,6 +1,6 @@
 //! `kmcfit explain`: documentation of a key as text.
 
-use super::{Found, MODEL, ValueType, all};
+use super::{Found, ValueType, all, model};
 use crate::config::retired::successor_of_name;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
@@ -20,7 +20,10 @@ pub fn explain(name: Option<&str>) -> Result<String, InputError> {
     let Some(name) = name else {
         let mut text =
             String::from("Keys of a model file (`kmcfit explain KEY` explains one):\n\n");
-        list(&mut text, MODEL.keys.iter().map(|key| (key.name, key.text)));
+        list(
+            &mut text,
+            model().keys.iter().map(|key| (key.name, key.text)),
+        );
         return Ok(text);
     };
     let wanted = without_positions(name);

@@ -3,14 +3,9 @@
 mod explain;
 mod schema;
 
-pub use super::key::{KeyDoc, KeyGroup, ValueType};
+pub use super::key::{KeyDoc, KeyGroup, ValueType, model};
 pub use explain::explain;
 pub use schema::schema;
-
-use super::spec::ModelSpec;
-
-/// The keys of a model.
-pub static MODEL: &KeyGroup = ModelSpec::GROUP;
 
 /// A key with its paths.
 #[derive(Debug, Clone)]
@@ -24,7 +19,7 @@ pub struct Found {
 /// Every key of a model file with all its paths, each once, in the order of the table.
 pub fn all() -> Vec<Found> {
     let mut found = Vec::new();
-    collect(MODEL, "", &mut found);
+    collect(model(), "", &mut found);
     found
 }
 

@@ -1,6 +1,6 @@
 //! JSON schema (draft 07) of a model file, for completion and validation in editors.
 
-use super::{KeyDoc, KeyGroup, MODEL, ValueType};
+use super::{KeyDoc, KeyGroup, ValueType, model};
 use serde_json::{Map, Value, json};
 
 /// The schema of a model file.
@@ -8,12 +8,12 @@ use serde_json::{Map, Value, json};
 /// The schema covers keys, types and choices; relations between keys are checked by the program.
 pub fn schema() -> Value {
     let mut definitions = Map::new();
-    define(MODEL, &mut definitions);
+    define(model(), &mut definitions);
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "kmcfit model file",
         "description": "A model of an oscillator and its records.",
-        "allOf": [reference(MODEL)],
+        "allOf": [reference(model())],
         "definitions": definitions,
     })
 }

@@ -24,7 +24,7 @@ pub(super) fn add(
             .expected("at least one constraint, or no `constraints`"));
     }
     for (i, spec) in list.iter().enumerate() {
-        let soft = spec.soft.map(|weight| weight.0);
+        let soft = spec.soft;
         for (key, constraint) in
             entry::read(Place::new(file, format!("constraints[{i}]")), grid, spec)?
         {

@@ -1,12 +1,12 @@
 //! Settings of a fit from the key `fit`: method, stopping tests, start strategy; refuses combinations that a method
 //! does not support.
 
-use crate::config::spec::{FitMethod, StopSpec};
-use crate::config::{ModelFile, Number};
+use crate::config::ModelFile;
 use crate::error::InputError;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, QpSolver, Solver, Stopping};
+use kmcfit_core::model::{FitMethod, StopSpec};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only
@@ -162,28 +162,28 @@ fn qp(file: &ModelFile, solver: Solver) -> Result<QpSolver, InputError> {
 
 fn memory(file: &ModelFile) -> Result<Option<usize>, InputError> {
     match file.spec.fit.as_ref().and_then(|f| f.memory.as_ref()) {
-        Some(memory) if memory.0 == 0 => Err(file
+        Some(memory) if *memory == 0 => Err(file
             .error_at("fit.memory", "L-BFGS needs a memory")
             .found(0)
             .expected("1 or more pairs")),
-        memory => Ok(memory.map(|m| m.0)),
+        memory => Ok(memory.copied()),
     }
 }
 
 fn stopping(file: &ModelFile, stop: &StopSpec) -> Result<Stopping, InputError> {
-    let positive = |key: &str, value: &Option<Number>| match value {
-        Some(value) if value.0 <= 0.0 => Err(file
+    let positive = |key: &str, value: &Option<f64>| match value {
+        Some(value) if *value <= 0.0 => Err(file
             .error_at(&format!("fit.stop.{key}"), "this limit must be positive")
-            .found(value.0)
+            .found(value)
             .expected(match key {
                 "seconds" => "a number greater than 0, in s",
                 _ => "a number greater than 0",
             })),
-        value => Ok(value.as_ref().map(|v| v.0)),
+        value => Ok(*value),
     };
     let seconds = positive("seconds", &stop.seconds)?;
     let given = Stopping {
-        iterations: stop.iterations.as_ref().map_or(1000, |n| n.0 as u64),
+        iterations: stop.iterations.as_ref().map_or(1000, |n| *n as u64),
         cost_ratio: positive("cost_ratio", &stop.cost_ratio)?,
         gradient_ratio: positive("gradient_ratio", &stop.gradient_ratio)?,
         tolerance: positive("tolerance", &stop.tolerance)?,

@@ -3,13 +3,6 @@
 use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::config::lowering::Place;
-use crate::config::spec::{
-    self as config, BasisName, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec,
-    PenaltyKind, WeightRuleName,
-};
-use crate::config::values::{
-    Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Weight,
-};
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{self, BasisSpec, CoefficientSpec, PenaltyWeight, Roughness};
 use kmcfit_core::internals::constraints::TimeHistory;
@@ -17,6 +10,13 @@ use kmcfit_core::internals::functions::{self, CoefficientKind};
 use kmcfit_core::internals::identifiability::{ScaleSource, scale_source};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
+use kmcfit_core::model::{
+    self as config, BasisName, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec,
+    PenaltyKind, WeightRuleName,
+};
+use kmcfit_core::model::{
+    Bound, KnotSpec, KnownValue, KnownValueMap, NumberOrColumn, StartSpec, WeightChoice,
+};
 
 /// Default lower limit of a mass, as a share of its smallest start value: a fit can otherwise end with a mass of nearly zero, whose
 /// response follows the force at all frequencies.
@@ -66,7 +66,7 @@ pub(super) fn specification(
     let is_own = !at.key.starts_with("functions.");
     check_basis_keys(at, given)?;
     let bound = |name: &str, given: &Option<Bound>| match given {
-        None | Some(Bound::None) => Ok(None),
+        None | Some(Bound::None(_)) => Ok(None),
         Some(Bound::At(given)) => history(&at.below(name), grid, given).map(Some),
     };
     let mut spec = match (&given.fixed, &given.start, given.basis) {
@@ -119,7 +119,7 @@ pub(super) fn specification(
         spec = spec.known_part(known(&at.below("known_part"), grid, part)?);
     }
     Ok(match given.width {
-        Some(width) => spec.width(width.0),
+        Some(width) => spec.width(width),
         None => spec,
     })
 }
@@ -131,9 +131,9 @@ fn refuse_negative_stiffness(
     fixed: &KnownValue,
 ) -> Result<(), InputError> {
     let value = match fixed {
-        KnownValue::Number(value) => Some(value.0),
-        KnownValue::Map(map) => map.value.map(|value| value.0),
-        KnownValue::Unknown => None,
+        KnownValue::Number(value) => Some(*value),
+        KnownValue::Map(map) => map.value,
+        KnownValue::Unknown(_) => None,
     };
     let functions = &at.file.spec.functions;
     let stiffening = [
@@ -165,9 +165,9 @@ fn is_known_part_alone(given: &FunctionSpec) -> bool {
 /// Known values at `key`.
 fn known(at: &Place<'_>, grid: &Grid, given: &KnownValue) -> Result<CoefficientSpec, InputError> {
     let map = match given {
-        KnownValue::Number(value) => return Ok(CoefficientSpec::fixed(value.0)),
-        KnownValue::Unknown if at.key == UNKNOWN_MASS => return Ok(CoefficientSpec::fixed(1.0)),
-        KnownValue::Unknown => {
+        KnownValue::Number(value) => return Ok(CoefficientSpec::fixed(*value)),
+        KnownValue::Unknown(_) if at.key == UNKNOWN_MASS => return Ok(CoefficientSpec::fixed(1.0)),
+        KnownValue::Unknown(_) => {
             return Err(at.error("only the mass can be unknown")
                 .found("`unknown`")
                 .expected("a value, or `basis` for a function to be fitted")
@@ -182,7 +182,7 @@ fn known(at: &Place<'_>, grid: &Grid, given: &KnownValue) -> Result<CoefficientS
         column,
     } = map;
     match (value, sigma, data, column) {
-        (Some(value), Some(sigma), None, None) => Ok(CoefficientSpec::uncertain(value.0, sigma.0)),
+        (Some(value), Some(sigma), None, None) => Ok(CoefficientSpec::uncertain(*value, *sigma)),
         (None, None, Some(data), Some(name)) => {
             let column = NumberOrColumn::Column(ColumnSpec {
                 data: data.clone(),
@@ -217,7 +217,7 @@ const UNKNOWN_MASS: &str = "functions.mass.fixed";
 /// True if the model states that the mass is unknown.
 pub(super) fn has_unknown_mass(file: &ModelFile) -> bool {
     let mass = file.spec.functions.get(CoefficientKind::MASS);
-    mass.is_some_and(|mass| mass.fixed == Some(KnownValue::Unknown))
+    mass.is_some_and(|mass| matches!(mass.fixed, Some(KnownValue::Unknown(_))))
 }
 
 /// Error for an unknown mass where a force or another known value determines the scale of the coefficients.
@@ -292,9 +292,9 @@ fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: BasisName) -> Result<BasisSp
             .expected(expected)
     };
     let knots = || match &spec.knots {
-        Some(KnotSpec::Count(count)) => Ok(builder::Knots::Count(count.0)),
-        Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
-        Some(KnotSpec::Auto) => Ok(builder::Knots::Auto),
+        Some(KnotSpec::Count(count)) => Ok(builder::Knots::Count(*count)),
+        Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(times.clone())),
+        Some(KnotSpec::Auto(_)) => Ok(builder::Knots::Auto),
         None => Err(missing(
             "knots",
             "`knots`: `auto`, the number of equally spaced knots, or a list of times in s",
@@ -307,7 +307,7 @@ fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: BasisName) -> Result<BasisSp
         BasisName::PiecewiseLinear => BasisSpec::PiecewiseLinear(knots()?),
         BasisName::BSpline => BasisSpec::BSpline(knots()?),
         BasisName::Polynomial => {
-            let Count(degree) = spec.degree.ok_or_else(|| {
+            let degree = spec.degree.ok_or_else(|| {
                 missing("a degree", "`degree`: an integer, for instance `degree: 1`")
             })?;
             BasisSpec::Polynomial { degree }
@@ -315,12 +315,8 @@ fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: BasisName) -> Result<BasisSp
     })
 }
 
-fn numbers(list: &[Number]) -> Vec<f64> {
-    list.iter().map(|number| number.0).collect()
-}
-
 fn basis_names() -> String {
-    let names: Vec<&str> = BasisName::ALL.iter().map(|(name, _)| *name).collect();
+    let names: Vec<&str> = BasisName::ALL.iter().map(|basis| basis.name()).collect();
     names.join(", ")
 }
 
@@ -331,12 +327,12 @@ fn start(
     given: &StartSpec,
 ) -> Result<builder::Start, InputError> {
     match given {
-        StartSpec::Number(value) => Ok(builder::Start::Constant(value.0)),
+        StartSpec::Number(value) => Ok(builder::Start::Constant(*value)),
         StartSpec::List(_) if kind == BasisName::BSpline => Err(at
             .error("`start` of the basis `b-spline` must be one number")
             .found("a list")
             .expected("a finite number, or a column: {data: file.csv, column: name}")),
-        StartSpec::List(values) => Ok(builder::Start::Parameters(numbers(values))),
+        StartSpec::List(values) => Ok(builder::Start::Parameters(values.clone())),
         StartSpec::Column(c) => Ok(builder::Start::Nodal(column(at, grid, c)?)),
     }
 }
@@ -349,7 +345,7 @@ fn penalty(
     if given.kind == PenaltyKind::TotalVariation {
         return total_variation(at, given);
     }
-    let Some(Count(order)) = given.order else {
+    let Some(order) = given.order else {
         return Err(at
             .error("the key `order` is missing")
             .found("a penalty of the kind `tikhonov` alone")
@@ -380,15 +376,15 @@ fn total_variation(at: &Place<'_>, given: &config::PenaltyKeys) -> Result<Roughn
     Ok(Roughness::TotalVariation { weight })
 }
 
-fn penalty_weight(given: Weight) -> PenaltyWeight {
+fn penalty_weight(given: WeightChoice) -> PenaltyWeight {
     let rule = match given {
-        Weight::Number(Number(weight)) => return PenaltyWeight::Given(weight),
-        Weight::Rule(WeightRuleName::Period) => return PenaltyWeight::Period,
-        Weight::Rule(WeightRuleName::Discrepancy) => functions::WeightRule::Discrepancy,
-        Weight::Rule(WeightRuleName::RestrictedLikelihood) => {
+        WeightChoice::Number(weight) => return PenaltyWeight::Given(weight),
+        WeightChoice::Rule(WeightRuleName::Period) => return PenaltyWeight::Period,
+        WeightChoice::Rule(WeightRuleName::Discrepancy) => functions::WeightRule::Discrepancy,
+        WeightChoice::Rule(WeightRuleName::RestrictedLikelihood) => {
             functions::WeightRule::RestrictedLikelihood
         }
-        Weight::Rule(WeightRuleName::Bic) => functions::WeightRule::Bic,
+        WeightChoice::Rule(WeightRuleName::Bic) => functions::WeightRule::Bic,
     };
     PenaltyWeight::Rule(rule)
 }
@@ -400,7 +396,7 @@ pub(super) fn history(
     given: &NumberOrColumn,
 ) -> Result<TimeHistory, InputError> {
     match given {
-        NumberOrColumn::Number(value) => Ok(TimeHistory::Constant(value.0)),
+        NumberOrColumn::Number(value) => Ok(TimeHistory::Constant(*value)),
         NumberOrColumn::Column(c) => Ok(TimeHistory::Nodal {
             name: format!("{} of {}", c.column, c.data),
             values: column(at, grid, c)?,
@@ -422,8 +418,8 @@ pub(super) fn values(
 
 /// Nodal values of a column named by `key`.
 fn column(at: &Place<'_>, grid: &Grid, given: &ColumnSpec) -> Result<Vec<f64>, InputError> {
-    let data = (&*given.data.0, &at.below("data"));
-    column_on_grid(data, (&given.column.0, &at.below("column")), grid)
+    let data = (&*given.data, &at.below("data"));
+    column_on_grid(data, (&given.column, &at.below("column")), grid)
 }
 
 /// The true coefficient functions on the grid, where the model names them.
@@ -437,9 +433,9 @@ pub(super) fn truth(
     let at = Place::new(file, "truth");
     let column = |(kind, _): Given| {
         let named = spec.columns.as_ref().and_then(|columns| columns.get(kind));
-        let name = named.map_or_else(|| kind.column(false), |name| name.0.clone());
+        let name = named.map_or_else(|| kind.column(false), |name| name.clone());
         let column = at.below(&format!("columns.{}", kind.name()));
-        column_on_grid((&spec.data.0, &at.below("data")), (&name, &column), grid)
+        column_on_grid((&spec.data, &at.below("data")), (&name, &column), grid)
     };
     let mut list = shared(file).into_iter();
     let mass = list.next().map(&column).transpose()?.unwrap_or_default();

@@ -9,13 +9,13 @@ use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};
 use super::functions;
 use crate::config::ModelFile;
-use crate::config::spec::{BasisName, FitMethod};
-use crate::config::values::{Count, KnotSpec, Nodes};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory::MOST_NODES_TIMES_PARAMETERS;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::system::{Grid, Method};
+use kmcfit_core::model::{BasisName, FitMethod};
+use kmcfit_core::model::{KnotSpec, Nodes};
 
 /// Most nodes of an automatic choice: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;
@@ -37,7 +37,7 @@ pub(super) fn build(
 ) -> Result<GridChoice, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
     let asked = match (mode.nodes(), asked) {
-        (Some(nodes), _) => Some(Nodes::Count(Count(nodes))),
+        (Some(nodes), _) => Some(Nodes::Count(nodes)),
         (None, asked) => asked.copied(),
     };
     let (start, duration) = span(file, records)?;
@@ -48,13 +48,13 @@ pub(super) fn build(
         Some(_) => None,
     };
     let stated = match asked {
-        Some(Nodes::Count(count)) => Some(count.0),
+        Some(Nodes::Count(count)) => Some(count),
         _ if !measured => {
             return Err(file
                 .error_at("grid", "the number of nodes is missing")
                 .expected("`nodes`, because there is no record"));
         }
-        Some(Nodes::Auto) => None,
+        Some(Nodes::Auto(_)) => None,
         None if is_automatic(file) => None,
         None => sampling,
     };
@@ -107,12 +107,10 @@ fn check_size(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(), Inp
             _ if matches!(mode, BuildMode::Simulate { .. }) => 0,
             None => 0,
             Some(BasisName::Constant) => 1,
-            Some(BasisName::Polynomial) => {
-                spec.degree.map_or(1, |degree| degree.0.saturating_add(1))
-            }
+            Some(BasisName::Polynomial) => spec.degree.map_or(1, |degree| degree.saturating_add(1)),
             Some(BasisName::Nodal) => FEW_PARAMETERS,
             Some(_) => match &spec.knots {
-                Some(KnotSpec::Count(count)) => count.0,
+                Some(KnotSpec::Count(count)) => *count,
                 Some(KnotSpec::Times(times)) => times.len(),
                 _ => FEW_PARAMETERS,
             },
@@ -161,11 +159,11 @@ fn node_per_sample(records: &[Option<RawRecord>]) -> Option<usize> {
 fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.duration.as_ref());
     if let Some(duration) = asked
-        && duration.0 <= 0.0
+        && *duration <= 0.0
     {
         return Err(file
             .error_at("grid.duration", "the duration is not positive")
-            .found(duration.0)
+            .found(duration)
             .expected("a length of time in s, greater than 0"));
     }
     let measured = || records.iter().flatten().filter(|r| !r.channels.is_empty());
@@ -174,7 +172,7 @@ fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), I
             file.error_at("grid", "the duration is missing")
                 .expected("`duration` in s, because there is no record")
         })?;
-        return Ok((0.0, duration.0));
+        return Ok((0.0, *duration));
     };
     let start = measured()
         .map(RawRecord::start)
@@ -184,17 +182,17 @@ fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), I
         .fold(f64::NEG_INFINITY, f64::max);
     let duration = end - start;
     if let Some(asked) = asked
-        && (asked.0 - duration).abs() > first.spacing() * 1e-6
+        && (asked - duration).abs() > first.spacing() * 1e-6
     {
         return Err(file
             .error_at(
                 "grid.duration",
                 "the duration differs from that of the records",
             )
-            .found(asked.0)
+            .found(asked)
             .expected(format!("{duration} or no `duration`")));
     }
-    Ok((start, asked.map_or(duration, |asked| asked.0)))
+    Ok((start, asked.map_or(duration, |asked| *asked)))
 }
 
 /// The stepper; classical Runge–Kutta unless the model says otherwise.

@@ -305,7 +305,7 @@ fn build_on(
         .enumerate()
         .partition(|(i, _)| validation(i));
     let truth = timed(&mut reading, || functions::truth(file, &grid))?;
-    let state = |s: &super::spec::StateSpec| State::one(s.displacement.0, s.velocity.0);
+    let state = |s: &kmcfit_core::model::StateSpec| State::one(s.displacement, s.velocity);
     let study = study::build(file, &built.problem)?;
     let source = source.unwrap_or_else(|| timed(&mut reading, || ModelSource::of(file)));
     Ok(Model {
@@ -349,7 +349,7 @@ fn build_on(
 
 fn title(file: &ModelFile) -> String {
     match &file.spec.title {
-        Some(title) => title.0.clone(),
+        Some(title) => title.clone(),
         None => file.path.file_stem().map_or_else(
             || "untitled".into(),
             |stem| stem.to_string_lossy().into_owned(),

@@ -12,11 +12,11 @@ use super::experiments::{RawChannel, RawRecord, is_held_out};
 use super::functions::{self, RecordStarts};
 use crate::config::ModelFile;
 use crate::config::dominant::{Oscillation, decay_ratio, remove_outliers};
-use crate::config::values::{ColumnSpec, KnownValue, NumberOrColumn, StartSpec};
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::signal::{driven_oscillator, onset};
 use kmcfit_core::internals::system::Grid;
+use kmcfit_core::model::{ColumnSpec, KnownValue, NumberOrColumn, StartSpec};
 use std::f64::consts::TAU;
 
 /// Damping ratio of a response that shows none: that of a lightly damped structure.
@@ -75,18 +75,18 @@ fn stated(file: &ModelFile, grid: &Grid, kind: CoefficientKind) -> Option<f64> {
         Some(values.iter().sum::<f64>() / values.len() as f64)
     };
     match (&given.fixed, &given.start) {
-        (Some(KnownValue::Unknown), _) => Some(1.0),
-        (Some(KnownValue::Number(number)), _) => Some(number.0),
+        (Some(KnownValue::Unknown(_)), _) => Some(1.0),
+        (Some(KnownValue::Number(number)), _) => Some(*number),
         (Some(KnownValue::Map(map)), _) => match (&map.value, &map.data, &map.column) {
-            (Some(value), _, _) => Some(value.0),
+            (Some(value), _, _) => Some(*value),
             (None, Some(data), Some(column)) => {
                 let (data, column) = (data.clone(), column.clone());
                 of_column("fixed", ColumnSpec { data, column })
             }
             _ => None,
         },
-        (None, Some(StartSpec::Number(number))) => Some(number.0),
-        (None, Some(StartSpec::List(values))) => values.first().map(|first| first.0),
+        (None, Some(StartSpec::Number(number))) => Some(*number),
+        (None, Some(StartSpec::List(values))) => values.first().copied(),
         (None, Some(StartSpec::Column(column))) => of_column("start", column.clone()),
         (None, None) => None,
     }

@@ -4,8 +4,6 @@ use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
 use crate::config::lowering::Place;
-use crate::config::spec::{CandidateSpec, EquivalentSpec, ProfileSpec, StudySpec};
-use crate::config::values::{Count, Number};
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
@@ -17,6 +15,7 @@ use kmcfit_core::internals::record::{
 };
 use kmcfit_core::internals::study::Choice;
 use kmcfit_core::internals::system::State;
+use kmcfit_core::model::{CandidateSpec, EquivalentSpec, ProfileSpec, StudySpec};
 
 /// Settings of the analyses of `study`.
 #[derive(Debug, Clone)]
@@ -93,11 +92,11 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     Ok(StudyPlan {
         equivalent_systems: equivalent,
         confidence,
-        seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
+        seed: spec.seed.map_or(SEED, |seed| seed as u64),
         profiles,
         extremes: extremes(&at, problem, spec)?,
-        misfit_limit: spec.misfit_limit.map(|level| level.0),
-        starts: spec.starts.map_or(0, |count| count.0),
+        misfit_limit: spec.misfit_limit,
+        starts: spec.starts.unwrap_or(0),
         spread,
         merge_tolerance,
         candidates,
@@ -119,10 +118,10 @@ fn each<S, T>(
 
 /// Refuses an invalid limit, count or time.
 fn check(at: &Place<'_>, spec: &StudySpec) -> Result<(), InputError> {
-    if let Some(level) = spec.misfit_limit.filter(|l| l.0 <= 0.0) {
+    if let Some(level) = spec.misfit_limit.filter(|l| *l <= 0.0) {
         return Err(at
             .error_in("misfit_limit", "the largest J must be positive")
-            .found(level.0)
+            .found(level)
             .expected("a number greater than 0 (dimensionless with `sigma`, otherwise m² s)"));
     }
     for (key, is_given) in [
@@ -135,11 +134,11 @@ fn check(at: &Place<'_>, spec: &StudySpec) -> Result<(), InputError> {
                 .expected("`starts` beside it"));
         }
     }
-    let is_invalid = |count: &Count| !(1..=MOST_STARTS).contains(&count.0);
+    let is_invalid = |count: &usize| !(1..=MOST_STARTS).contains(count);
     if let Some(count) = spec.starts.filter(is_invalid) {
         return Err(at
             .error_in("starts", "invalid number")
-            .found(count.0)
+            .found(count)
             .expected(format!("1 to {MOST_STARTS}, or no `starts`")));
     }
     let extremes = spec.extremes.as_ref();
@@ -169,7 +168,7 @@ fn equivalent(
     let damping = spec.damping.as_ref();
     let damping = damping.map(|d| values(&at.below("damping"), grid, d));
     Ok(Choice {
-        name: spec.name.0.clone(),
+        name: spec.name.clone(),
         mass,
         damping: damping.transpose()?,
     })
@@ -178,19 +177,19 @@ fn equivalent(
 fn within(
     at: &Place<'_>,
     key: &str,
-    (given, usual): (Option<Number>, f64),
+    (given, usual): (Option<f64>, f64),
     fits: fn(f64) -> bool,
 ) -> Result<f64, InputError> {
     match given {
-        Some(number) if !fits(number.0) => Err(at
+        Some(number) if !fits(number) => Err(at
             .error_in(key, "invalid number")
-            .found(number.0)
+            .found(number)
             .expected(match key {
                 "confidence" => "a number between 0 and 1, for instance 0.95",
                 "spread" => "a factor greater than 1, at most 1e6",
                 _ => "a number greater than 0",
             })),
-        given => Ok(given.map_or(usual, |number| number.0)),
+        given => Ok(given.unwrap_or(usual)),
     }
 }
 
@@ -203,10 +202,10 @@ fn extremes(at: &Place<'_>, problem: &Problem, spec: &StudySpec) -> Result<Vec<f
         return Ok((0..EXTREME_TIMES).map(time).collect());
     };
     for (i, time) in given.values().iter().enumerate() {
-        let at = at.below(&format!("extremes{}", given.place(i)));
-        on_grid(&at, problem, time.0)?;
+        let at = at.below(&format!("extremes{}", given.suffix(i)));
+        on_grid(&at, problem, *time)?;
     }
-    Ok(given.values().iter().map(|t| t.0).collect())
+    Ok(given.values().to_vec())
 }
 
 fn on_grid(at: &Place<'_>, problem: &Problem, time: f64) -> Result<(), InputError> {
@@ -231,8 +230,8 @@ fn target(at: &Place<'_>, problem: &Problem, spec: &ProfileSpec) -> Result<Targe
             let function = function(at, problem, name)?;
             match (spec.at, mean) {
                 (Some(time), false) => {
-                    on_grid(&at.below("at"), problem, time.0)?;
-                    Ok(Target::Value(Curve::Function(function), time.0))
+                    on_grid(&at.below("at"), problem, time)?;
+                    Ok(Target::Value(Curve::Function(function), time))
                 }
                 (None, true) => Ok(Target::Mean(Curve::Function(function))),
                 (None, false) if problem.functions.get(function).parameters() == 1 => {
@@ -245,17 +244,17 @@ fn target(at: &Place<'_>, problem: &Problem, spec: &ProfileSpec) -> Result<Targe
         }
         (None, Some(name)) => {
             let scalars = problem.functions.scalars();
-            let found = scalars.iter().position(|s| s.name == name.0);
+            let found = scalars.iter().position(|s| s.name == *name);
             found.map(Target::Scalar).ok_or_else(|| {
                 let names = || scalars.iter().map(|s| s.name.as_str());
                 let error = at
                     .error_in("parameter", "no such nuisance parameter")
-                    .found(quote(&name.0))
+                    .found(quote(name))
                     .expected(match scalars.is_empty() {
                         true => "a model that estimates initial states or sensors".to_owned(),
                         false => one_of(names()),
                     });
-                match did_you_mean(&name.0, names()) {
+                match did_you_mean(name, names()) {
                     Some(hint) => error.hint(hint),
                     None => error,
                 }
@@ -296,8 +295,8 @@ fn candidate(
 ) -> Result<Experiment, InputError> {
     let grid = &problem.system.grid;
     let nodes = grid.nodes();
-    let initial = State::one(spec.initial.displacement.0, spec.initial.velocity.0);
-    let mut experiment = Experiment::free(spec.name.0.clone(), initial, nodes);
+    let initial = State::one(spec.initial.displacement, spec.initial.velocity);
+    let mut experiment = Experiment::free(spec.name.clone(), initial, nodes);
     if let Some(force) = &spec.force {
         let force = Some(Waveform::Shape(experiments::shape(at, force)?));
         experiment.input = Input { force, base: None };
@@ -305,13 +304,13 @@ fn candidate(
     }
     let kind = spec.channel.unwrap_or(ChannelKind::Displacement);
     let weighting = match (spec.sigma, problem.channels().next()) {
-        (Some(sigma), _) if sigma.0 <= 0.0 => {
+        (Some(sigma), _) if sigma <= 0.0 => {
             return Err(at
                 .error_in("sigma", "a standard deviation must be positive")
-                .found(sigma.0)
+                .found(sigma)
                 .expected("a number greater than 0, in SI units"));
         }
-        (Some(sigma), _) => Weighting::Sigma(sigma.0),
+        (Some(sigma), _) => Weighting::Sigma(sigma),
         (None, Some(channel)) => match channel.weighting() {
             Weighting::Sigmas(sigmas) => Weighting::Sigma(sigmas[0]),
             Weighting::Trapezoid(_) => Weighting::Integral {

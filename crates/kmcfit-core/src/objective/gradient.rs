@@ -11,11 +11,12 @@ use crate::system::{NodalCoefficients, State};
 type Slopes<'a> = dyn Fn(usize, usize) -> Vec<f64> + 'a;
 
 /// Adjoint that computes the gradient.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum GradientKind {
-    /// Exact transpose of the linearised stepper.
+    /// Exact gradient of the discretised cost (discrete adjoint).
     Discrete,
-    /// Eq. 13 of the paper, discretised; consistent with the cost but not its exact derivative.
+    /// Discretised adjoint differential equation (continuous adjoint, Eq. 13 of the paper): not the exact derivative of the cost.
     Continuous,
 }
 

@@ -1,7 +1,10 @@
 //! Kinds of measured quantities.
 
 /// Measured quantity of a channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum ChannelKind {
     /// Displacement `y`, m.
     Displacement,

@@ -8,7 +8,8 @@ use std::sync::Arc;
 const NEARNESS: f64 = 1e-6;
 
 /// Interpolation between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
     /// Zero-order hold: the last sample until the next one, with jumps.
     Hold,

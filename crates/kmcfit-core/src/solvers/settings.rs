@@ -38,13 +38,15 @@ impl Solver {
 }
 
 /// Initial parameters of a fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Initial {
     /// Start values of the functions.
     Functions,
     /// Minimum of the equation error of the samples.
     Data,
     /// Start values of the functions, near an optimum: no other is tried.
+    #[serde(skip)]
     Near,
 }
 
@@ -96,7 +98,8 @@ impl StartStrategy {
 }
 
 /// Solver of the quadratic programs of steps under constraints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum QpSolver {
     /// Clipping and eliminations where they give the step; along time an interior-point method on stages; Clarabel
     /// otherwise.

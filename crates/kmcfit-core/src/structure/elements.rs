@@ -257,7 +257,7 @@ const TABLE: [CoefficientRow; 10] = [
 pub const MOST_ELEMENTS: usize = TABLE.len() - 1;
 
 /// Kind of a coefficient function of the equation of motion: a row of the table.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CoefficientKind(u8);
 
 #[allow(missing_docs, reason = "see the rows")]

@@ -1,7 +1,8 @@
 //! Methods of the forward solve.
 
 /// Method of the forward solve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Explicit midpoint rule, second order: that of the paper.
     Midpoint,
@@ -9,6 +10,7 @@ pub enum Method {
     Rk4,
     /// Implicit midpoint rule, second order: stable with every step, for stiff structures. An undamped linear oscillation of frequency
     /// `omega` keeps its energy and has the frequency `2 atan(omega h / 2) / h`.
+    #[serde(skip)]
     ImplicitMidpoint,
 }
 

@@ -5,13 +5,13 @@
 
 use crate::config::lowering::Place;
 use crate::config::lowering::functions::history;
-use crate::config::spec::{ConstraintSpec, RangeSpec};
-use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;
 use crate::number_format::count;
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::{Grid, TimePoint};
+use kmcfit_core::model::NumberOrColumn;
+use kmcfit_core::model::{ConstraintSpec, RangeSpec};
 
 /// Kind of a constraint, by its key.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,9 +149,9 @@ impl ConstraintReader<'_> {
                 .error("ratio", "only `equal` has a ratio")
                 .found(format!("`ratio` beside {}", kind.name()))
                 .expected("no `ratio`")),
-            Some(ratio) if ratio.0 == 0.0 => Err(self
+            Some(ratio) if ratio == 0.0 => Err(self
                 .error("ratio", "a ratio must not be 0")
-                .found(ratio.0)
+                .found(ratio)
                 .expected(
                     "a number other than 0; for a function that is zero, `max: 0` and `min: 0`",
                 )),
@@ -169,7 +169,7 @@ impl ConstraintReader<'_> {
     fn constraints(&self, kind: ConstraintKey) -> Result<Vec<(String, Constraint)>, InputError> {
         let spec = self.spec;
         let of = self.target_function();
-        let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
+        let number = |given: Option<f64>| given.unwrap_or(0.0);
         let constraint = match kind {
             ConstraintKey::Shape => return self.shapes(),
             ConstraintKey::Values => return self.fixed_values(),
@@ -226,7 +226,7 @@ impl ConstraintReader<'_> {
         };
         self.not_empty("shape", shapes.values().len(), "at least one shape")?;
         let constraint = |(i, &shape): (usize, &Shape)| {
-            let key = format!("{}.shape{}", self.at.key, shapes.place(i));
+            let key = format!("{}.shape{}", self.at.key, shapes.suffix(i));
             let of = self.target_function();
             (key, Constraint::Shape { of, shape })
         };
@@ -259,12 +259,12 @@ impl ConstraintReader<'_> {
         let (start, end) = (self.grid.start(), self.grid.time(self.grid.nodes() - 1));
         // A time outside the grid within this distance (s) counts as its end.
         let slack = TimePoint::SAME_TIME * self.grid.step();
-        let constraint = |(i, time): (usize, &Number)| {
-            let below = format!("at{}", at.place(i));
-            if time.0 < start - slack || time.0 > end + slack {
+        let constraint = |(i, time): (usize, &f64)| {
+            let below = format!("at{}", at.suffix(i));
+            if *time < start - slack || *time > end + slack {
                 return Err(self
                     .error(&below, "this time lies outside the grid")
-                    .found(time.0)
+                    .found(time)
                     .expected(format!(
                         "a time from {start} s to {} s",
                         self.grid.round_time(end)
@@ -272,8 +272,8 @@ impl ConstraintReader<'_> {
             }
             let fixed = Constraint::Value {
                 of: self.target_function(),
-                at: time.0.clamp(start, end),
-                value: values[i.min(values.len() - 1)].0,
+                at: time.clamp(start, end),
+                value: values[i.min(values.len() - 1)],
             };
             Ok((self.at.below(&below).key, fixed))
         };
@@ -286,7 +286,7 @@ impl ConstraintReader<'_> {
             [first, second] if first != second => Ok(Constraint::Equal {
                 first: *first,
                 second: *second,
-                ratio: self.spec.ratio.map_or(1.0, |r| r.0),
+                ratio: self.spec.ratio.unwrap_or(1.0),
             }),
             [first, _] => Err(self
                 .error("equal", "the two functions are the same")
@@ -310,7 +310,7 @@ impl ConstraintReader<'_> {
                     "damping_ratio.min",
                     "a lower bound on the damping ratio is not supported",
                 )
-                .found(min.0)
+                .found(min)
                 .expected("`max` alone, because a lower bound is not a convex constraint"));
         }
         let (_, max) = self.range("damping_ratio", range)?;
@@ -328,7 +328,7 @@ impl ConstraintReader<'_> {
         key: &str,
         range: Option<&RangeSpec>,
     ) -> Result<(Option<f64>, Option<f64>), InputError> {
-        let end = |end: fn(&RangeSpec) -> Option<Number>| range.and_then(end).map(|n| n.0);
+        let end = |end: fn(&RangeSpec) -> Option<f64>| range.and_then(end);
         let (min, max) = (end(|r| r.min), end(|r| r.max));
         match (min, max) {
             (None, None) => Err(self

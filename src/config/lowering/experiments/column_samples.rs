@@ -3,10 +3,7 @@
 use super::Entry;
 use super::data_facts::{FIRST, MEAN, MERGED, MOST_PLACES, RecordNotes, fact};
 use super::unit::QuantityColumn;
-use crate::config::alternatives::{OneOrList, ScalarOr};
 use crate::config::lowering::Place;
-use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
-use crate::config::values::{ColumnId, Text};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::number_format::significant;
@@ -15,6 +12,9 @@ use crate::tables::{
     repeated_times, sample_rates, without_rounding,
 };
 use crate::units::{Quantity, Unit};
+use kmcfit_core::model::ColumnId;
+use kmcfit_core::model::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
+use kmcfit_core::model::{OneOrList, ScalarOr};
 use serde_json::json;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -86,7 +86,7 @@ pub struct ColumnRequest<'a> {
     /// The column.
     pub column: &'a ColumnRef,
     /// Unit given in the model file.
-    pub unit: Option<&'a Text>,
+    pub unit: Option<&'a String>,
     /// Another column of the same file, in the same unit, and its key.
     pub beside: Option<(&'a str, &'a Place<'a>)>,
 }
@@ -158,7 +158,7 @@ pub fn read(wanted: &ColumnRequest, notes: &mut RecordNotes) -> Result<ColumnSam
     }
     let duplicates = spec.duplicates.unwrap_or_default();
     let codes = spec.missing.as_ref().map_or(&[][..], OneOrList::values);
-    let is_code = |value: f64| codes.iter().any(|code| code.0 == value);
+    let is_code = |value: f64| codes.contains(&value);
     let samples = |column| {
         let merged = times.repeated.merged(column, duplicates);
         let inside = merged[inside.clone()].iter();
@@ -169,7 +169,7 @@ pub fn read(wanted: &ColumnRequest, notes: &mut RecordNotes) -> Result<ColumnSam
         inside.map(value).collect()
     };
     let (values, beside) = (samples(values), beside.map(samples));
-    let zero = spec.time_zero.map_or(0.0, |t| t.0);
+    let zero = spec.time_zero.unwrap_or(0.0);
     Ok(ColumnSamples {
         outside: times.values.len() - inside.len(),
         times: (times.values[inside].iter())
@@ -242,7 +242,7 @@ impl<'a> Source<'a> {
         Ok(Self {
             entry,
             at,
-            name: &data.0,
+            name: data,
             format: format(spec),
             columns,
         })
@@ -305,7 +305,7 @@ fn format(spec: &ExperimentSpec) -> TableFormat {
             DecimalSign::Point => '.',
             DecimalSign::Comma => ',',
         }),
-        skip: given.skip.map(|count| count.0),
+        skip: given.skip,
         header: given.header,
         units_row: given.units_row,
     }
@@ -341,14 +341,14 @@ fn times(
         },
     };
     if let Some(rate) = rate {
-        if !SAMPLE_RATES.contains(&rate.0) {
+        if !SAMPLE_RATES.contains(&rate) {
             return Err(at
                 .error_in("sample_rate", "invalid sampling rate")
-                .found(format!("{:?}", rate.0))
+                .found(format!("{:?}", rate))
                 .expected(sample_rates()));
         }
         return Ok(Times {
-            values: (0..table.rows()).map(|i| i as f64 / rate.0).collect(),
+            values: (0..table.rows()).map(|i| i as f64 / rate).collect(),
             label: String::new(),
             unit: None,
             repeated: RepeatedTimes::NONE,
@@ -413,8 +413,8 @@ pub fn window(entry: &Entry<'_>) -> Result<[f64; 2], InputError> {
     let Some(window) = &entry.spec.window else {
         return Ok([f64::NEG_INFINITY, f64::INFINITY]);
     };
-    let from = window.min.map_or(f64::NEG_INFINITY, |t| t.0);
-    let to = window.max.map_or(f64::INFINITY, |t| t.0);
+    let from = window.min.unwrap_or(f64::NEG_INFINITY);
+    let to = window.max.unwrap_or(f64::INFINITY);
     if from >= to {
         return Err((entry.at)
             .error_in("window", "the window is empty")

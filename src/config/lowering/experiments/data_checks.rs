@@ -2,11 +2,7 @@
 
 use super::{Entry, RawChannel, RawRecord, is_equation_error, sensor_of};
 use crate::config::ModelFile;
-use crate::config::alternatives::ScalarOr;
 use crate::config::dominant::Oscillation;
-use crate::config::spec::{ExperimentSpec, InitialSpec};
-use crate::config::values::KnownValue;
-use crate::config::values::NumberOrEstimate;
 use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
@@ -21,6 +17,10 @@ use kmcfit_core::internals::signal::{
 };
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::both;
+use kmcfit_core::model::KnownValue;
+use kmcfit_core::model::NumberOrEstimate;
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::{ExperimentSpec, InitialSpec};
 use serde_json::json;
 use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};
@@ -99,7 +99,7 @@ fn excluded_frequency(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     // A frequency is known to about the spacing of the spectrum.
     let error = spectrum.resolution();
     let range = ranges.find_map(|range| {
-        let [min, max] = [&range.min, &range.max].map(|end| end.as_ref().map(|end| end.0));
+        let [min, max] = [range.min, range.max];
         let is_below = min.is_some_and(|min| frequency + error < min);
         let is_above = max.is_some_and(|max| frequency - error > max);
         (is_below || is_above).then_some([min, max])
@@ -155,9 +155,9 @@ fn unit_factors(
     let displacement = first(ChannelKind::Displacement);
     if let (Some(channel), InitialSpec::Map(state)) = (displacement, &spec.initial)
         && let ScalarOr::Scalar(NumberOrEstimate::Number(start)) = &state.displacement
-        && start.0 != 0.0
+        && *start != 0.0
     {
-        let ratio = (channel.values[0] / start.0).abs();
+        let ratio = (channel.values[0] / start).abs();
         add(ratio, "the first displacement".to_owned());
     }
     for pair in [
@@ -242,9 +242,9 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
 /// The mass that the measured force and the first channel imply, where it differs from the stated one by the factor between two units.
 fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     let stated = match (file.spec.functions.get(CoefficientKind::MASS)?.fixed).as_ref()? {
-        KnownValue::Number(number) => number.0,
-        KnownValue::Map(map) => map.value?.0,
-        KnownValue::Unknown => return None,
+        KnownValue::Number(number) => *number,
+        KnownValue::Map(map) => map.value?,
+        KnownValue::Unknown(_) => return None,
     };
     let channel = record.channels.first()?;
     let spacing = channel.spacing?;
@@ -291,7 +291,7 @@ fn opposite_signs(
 fn gain_sign(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
     match sensor_of(spec, kind).and_then(|sensor| sensor.gain.as_ref()) {
         None => Some(1.0),
-        Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.0.signum()),
+        Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.signum()),
         Some(_) => None,
     }
 }
@@ -421,7 +421,7 @@ fn rest_before_motion(spec: &ExperimentSpec, record: &RawRecord) -> Option<Findi
 
 /// Time of a sample on the time axis of its file, s.
 fn in_file(spec: &ExperimentSpec, channel: &RawChannel, sample: usize) -> f64 {
-    let zero = spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
+    let zero = spec.time_zero.unwrap_or(0.0);
     round_time(channel.times[sample] + zero, channel.median_spacing)
 }
 

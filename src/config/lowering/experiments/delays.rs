@@ -2,15 +2,15 @@
 
 use super::data_facts::{RecordNotes, time};
 use super::{Entry, RawRecord};
-use crate::config::alternatives::ScalarOr;
-use crate::config::spec::{DelayValue, ExperimentSpec, InputSensorSpec};
-use crate::config::values::NumberOrEstimate;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::builder::ScalarSpec;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::system::Grid;
+use kmcfit_core::model::NumberOrEstimate;
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::{DelayValue, ExperimentSpec, InputSensorSpec};
 use serde_json::json;
 use std::sync::Arc;
 
@@ -100,14 +100,14 @@ fn delay(
     let (start, range) = match given {
         None => return Ok(Delay::Known(0.0)),
         Some(ScalarOr::Scalar(NumberOrEstimate::Number(delay))) => {
-            return Ok(Delay::Known(delay.0));
+            return Ok(Delay::Known(*delay));
         }
-        Some(ScalarOr::Scalar(NumberOrEstimate::Estimate)) => (0.0, [-usual, usual]),
+        Some(ScalarOr::Scalar(NumberOrEstimate::Estimate(_))) => (0.0, [-usual, usual]),
         Some(ScalarOr::Map(spec)) => {
-            let start = spec.start.map(|s| s.0);
+            let start = spec.start;
             let around = start.unwrap_or(0.0);
-            let least = spec.min.map_or(around - usual, |d| d.0);
-            let most = spec.max.map_or(around + usual, |d| d.0);
+            let least = spec.min.unwrap_or(around - usual);
+            let most = spec.max.map_or(around + usual, |d| d);
             let middle = if (least..=most).contains(&0.0) {
                 0.0
             } else {

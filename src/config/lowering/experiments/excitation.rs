@@ -5,12 +5,11 @@ use super::column_samples::{self, ColumnRequest, ColumnSamples};
 use super::data_facts::{RecordNotes, USED};
 use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::lowering::Place;
-use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
-use crate::config::values::Number;
 use crate::error::InputError;
 use crate::units::Quantity;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
+use kmcfit_core::model::{ExperimentSpec, ForceShape, ForceSpec};
 use std::ops::Range;
 
 /// Reads the excitation of an experiment.
@@ -163,7 +162,7 @@ fn signal(
     let [from, to] = column_samples::window(entry)?;
     let known = known_stretches(&source.values);
     let last = source.times.len() - 1;
-    let zero = spec.time_zero.map_or(0.0, |t| t.0);
+    let zero = spec.time_zero.unwrap_or(0.0);
     let [from, to] = [
         (from - zero).max(source.times[0]),
         (to - zero).min(source.times[last]),
@@ -207,7 +206,7 @@ pub fn shape(at: &Place<'_>, spec: &ForceSpec) -> Result<ExcitationShape, InputE
             .expected("`columns: {force: …}`, or `shape` here"));
     };
     shape_keys(&at, shape, spec)?;
-    let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
+    let number = |given: Option<f64>| given.unwrap_or(0.0);
     let (amplitude, start) = (number(spec.amplitude), number(spec.at));
     let duration = number(spec.duration);
     Ok(match shape {
@@ -281,10 +280,10 @@ fn shape_keys(at: &Place<'_>, shape: ForceShape, spec: &ForceSpec) -> Result<(),
         ("duration", spec.duration, "s"),
     ];
     for (name, value, unit) in positive {
-        if let Some(value) = value.filter(|v| v.0 <= 0.0) {
+        if let Some(value) = value.filter(|v| *v <= 0.0) {
             return Err(at
                 .error_in(name, format!("the {name} must be positive"))
-                .found(format!("{} {unit}", value.0))
+                .found(format!("{} {unit}", value))
                 .expected(format!("a number greater than 0, in {unit}")));
         }
     }

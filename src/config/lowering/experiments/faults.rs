@@ -6,7 +6,6 @@ use super::data_facts::{
     Action, EXCLUDED, GapPlace, INTERPOLATED, MISSING, MOST_PLACES, RecordNotes, USED, fact,
     gaps_in_words, spans_in_words, time, times_in_words,
 };
-use crate::config::spec::FaultName;
 use crate::finding::Finding;
 use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
@@ -15,6 +14,7 @@ use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::{available_for, both};
+use kmcfit_core::model::FaultName;
 use serde_json::json;
 
 /// Spacing, in median spacings, above which samples are missing.
@@ -101,7 +101,7 @@ impl Column<'_> {
 
     /// Time on the axis of the file, s.
     fn in_file(&self, times: &[f64], i: usize) -> f64 {
-        let zero = self.entry.spec.time_zero.map_or(0.0, |t| t.0);
+        let zero = self.entry.spec.time_zero.unwrap_or(0.0);
         let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
         round_time(times[i] + zero, spacing)
     }

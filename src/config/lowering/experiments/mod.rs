@@ -12,13 +12,7 @@ mod unit;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
-use crate::config::alternatives::ScalarOr;
 use crate::config::lowering::Place;
-use crate::config::spec::{
-    EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
-    SensorKeys,
-};
-use crate::config::values::{EstimateWord, NumberOrEstimate};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::Unit;
@@ -34,6 +28,12 @@ use kmcfit_core::internals::record::{
 };
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::{
+    EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
+    SensorKeys,
+};
+use kmcfit_core::model::{EstimateWord, NumberOrEstimate};
 use std::sync::Arc;
 
 pub(super) use excitation::shape;
@@ -263,7 +263,7 @@ pub(super) fn specification(
     defaults: functions::Defaults<'_>,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = entry.spec;
-    let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
+    let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate(EstimateWord));
     let initial = match &spec.initial {
         InitialSpec::Scalar(EstimateWord) => [&estimate, &estimate],
         InitialSpec::Map(state) => [&state.displacement, &state.velocity],
@@ -282,7 +282,7 @@ pub(super) fn specification(
             InputErrorName::Sensor => InputNoiseKind::Sensor,
             InputErrorName::Drive => InputNoiseKind::Drive,
         };
-        found = found.input_error(quantity, kind, error.value.0);
+        found = found.input_error(quantity, kind, error.value);
     }
     let mut notes = Vec::new();
     if let Some(record) = record {
@@ -323,13 +323,13 @@ fn input_sigma<'a>(
 /// A number that is fixed or estimated.
 fn scalar(given: &EstimateValue) -> ScalarSpec {
     match given {
-        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => ScalarSpec::Known(number.0),
-        ScalarOr::Scalar(NumberOrEstimate::Estimate) => ScalarSpec::ESTIMATED,
+        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => ScalarSpec::Known(*number),
+        ScalarOr::Scalar(NumberOrEstimate::Estimate(EstimateWord)) => ScalarSpec::ESTIMATED,
         ScalarOr::Map(spec) => ScalarSpec::Estimated {
-            start: spec.start.map(|start| start.0),
+            start: spec.start,
             prior: spec.prior.as_ref().map(|prior| Prior {
-                mean: prior.mean.0,
-                sigma: prior.sigma.0,
+                mean: prior.mean,
+                sigma: prior.sigma,
             }),
         },
     }

@@ -2,10 +2,10 @@
 
 use super::{Entry, RawChannel, RawRecord};
 use crate::config::ModelFile;
-use crate::config::spec::ColumnRef;
 use crate::error::InputError;
 use crate::finding::Finding;
 use kmcfit_core::internals::assessment::Severity;
+use kmcfit_core::model::ColumnRef;
 
 /// Refuses an experiment with the same column in two places.
 ///

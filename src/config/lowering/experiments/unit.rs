@@ -1,7 +1,6 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
 use crate::config::lowering::Place;
-use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
@@ -20,7 +19,7 @@ pub(super) struct QuantityColumn<'a> {
     pub name: &'a str,
     pub kind: Quantity,
     /// Unit given in the model file.
-    pub given: Option<&'a Text>,
+    pub given: Option<&'a String>,
     pub table: &'a Table,
     pub index: usize,
 }
@@ -74,12 +73,12 @@ impl QuantityColumn<'_> {
 
     fn given_unit(
         &self,
-        text: &Text,
+        text: &String,
         warnings: &mut Vec<Finding>,
     ) -> Result<ScaledUnit, InputError> {
         let units_key = self.key("units");
         let other = self.stated();
-        let scaled = ScaledUnit::parse(self.kind, &text.0, other)
+        let scaled = ScaledUnit::parse(self.kind, text, other)
             .map_err(|error| self.at.file.error_about(&units_key, error))?;
         let unit = scaled.unit;
         let differs = |other: &Unit| !other.is_arbitrary() && other.factor() != unit.factor();

@@ -8,15 +8,16 @@ use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
 /// Shape of a function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// Never rising.
+    /// Monotonically non-increasing.
     NonIncreasing,
-    /// Never falling.
+    /// Monotonically non-decreasing.
     NonDecreasing,
-    /// Slope never falling.
+    /// Convex: its slope never falls.
     Convex,
-    /// Slope never rising.
+    /// Concave: its slope never rises.
     Concave,
 }
 

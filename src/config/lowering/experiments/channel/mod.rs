@@ -7,13 +7,8 @@ use super::column_samples::{self, ColumnRequest, ColumnSamples, PresentRows};
 use super::data_facts::RecordNotes;
 use super::faults::{Column, is_coarse, quantisation_step};
 use super::{ChannelNote, names};
-use crate::config::alternatives::ScalarOr;
 use crate::config::lowering::Place;
 use crate::config::lowering::experiments::Entry;
-use crate::config::spec::{
-    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorKeys,
-};
-use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
 use crate::number_format::{count, significant};
 use crate::units::Unit;
@@ -21,6 +16,11 @@ use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use kmcfit_core::internals::system::Grid;
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::{ColumnId, SigmaValue};
+use kmcfit_core::model::{
+    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorKeys,
+};
 use noise::{loss, noise_model, weighting, with_quantisation};
 use sampling::{band, decimate};
 use std::sync::Arc;
@@ -77,8 +77,8 @@ impl RawChannel {
 struct Spec<'a> {
     kind: ChannelKind,
     column: Option<&'a ColumnRef>,
-    unit: Option<&'a Text>,
-    sigma: Option<&'a Sigma>,
+    unit: Option<&'a String>,
+    sigma: Option<&'a SigmaValue>,
     loss: Option<&'a ScalarOr<LossName, LossSpec>>,
     noise: Option<&'a ScalarOr<CorrelationName, CorrelationSpec>>,
     sensor: Option<&'a SensorKeys>,
@@ -188,7 +188,7 @@ fn read_one(
     let (kind, spec, at) = (of_kind.kind, entry.spec, &entry.at);
     let sigma_at = at.below(&format!("sigma.{}", kind.name()));
     let sigma_column = match of_kind.sigma {
-        Some(Sigma::Column(name)) => Some((name.as_str(), &sigma_at)),
+        Some(SigmaValue::Column(name)) => Some((name.as_str(), &sigma_at)),
         _ => None,
     };
     let wanted = ColumnRequest {
@@ -219,7 +219,7 @@ fn read_one(
         ignored.push((source.outside, "outside the window".to_owned()));
     }
     if let Some(factor) = spec.decimate {
-        decimate(at, factor.0, &mut source, &mut ignored)?;
+        decimate(at, factor, &mut source, &mut ignored)?;
     }
     let span = [source.times[0], source.times[source.times.len() - 1]];
     let present = PresentRows::of(&source.values);
@@ -244,7 +244,7 @@ fn read_one(
     Ok(RawChannel {
         kind,
         span,
-        decimated: spec.decimate.is_some_and(|factor| factor.0 > 1),
+        decimated: spec.decimate.is_some_and(|factor| factor > 1),
         median_spacing: median_spacing(&times),
         times: Arc::new(times),
         values: Arc::new(values),

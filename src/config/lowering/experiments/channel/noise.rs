@@ -2,13 +2,13 @@
 
 use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
-use crate::config::alternatives::ScalarOr;
 use crate::config::lowering::Place;
-use crate::config::spec::{CorrelationName, LossName};
-use crate::config::values::Sigma;
 use crate::error::InputError;
 use crate::number_format::significant;
 use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
+use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::SigmaValue;
+use kmcfit_core::model::{CorrelationName, LossName};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
 const HUBER: f64 = 1.345;
@@ -19,19 +19,19 @@ const FIRST_SIGMA: f64 = 0.05;
 
 pub(super) fn weighting(
     at: &Place<'_>,
-    sigma: Option<&Sigma>,
+    sigma: Option<&SigmaValue>,
     sigmas: Option<Vec<f64>>,
     values: &[f64],
 ) -> Result<Option<Weighting>, InputError> {
     match (sigma, sigmas) {
         (None, _) => Ok(None),
-        (Some(Sigma::Number(sigma)), _) => Ok(Some(Weighting::Sigma(sigma.0))),
-        (Some(Sigma::Estimate), _) => {
+        (Some(SigmaValue::Number(sigma)), _) => Ok(Some(Weighting::Sigma(*sigma))),
+        (Some(SigmaValue::Estimate(_)), _) => {
             let size = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
             let sigma = FIRST_SIGMA * if size > 0.0 { size } else { 1.0 };
             Ok(Some(Weighting::Estimated { sigma }))
         }
-        (Some(Sigma::Column(name)), Some(sigmas)) => {
+        (Some(SigmaValue::Column(name)), Some(sigmas)) => {
             match sigmas.iter().position(|s| !s.is_finite() || *s <= 0.0) {
                 Some(row) => Err(at
                     .error("a standard deviation must be positive")
@@ -47,7 +47,7 @@ pub(super) fn weighting(
                 None => Ok(Some(Weighting::Sigmas(sigmas))),
             }
         }
-        (Some(Sigma::Column(_)), None) => Ok(None),
+        (Some(SigmaValue::Column(_)), None) => Ok(None),
     }
 }
 
@@ -94,10 +94,10 @@ pub(super) fn loss(at: &Place<'_>, of_kind: &Spec) -> Result<Loss, InputError> {
                     .found(format!("`{part}`"))
                     .expected(format!("`{part}` for `{owner}` only")));
             }
-            Some(number) if number.0 <= 0.0 => {
+            Some(number) if number <= 0.0 => {
                 return Err(at
                     .error_in(part, format!("the `{part}` must be positive"))
-                    .found(number.0)
+                    .found(number)
                     .expected(match part {
                         "threshold" => "a number greater than 0, in standard deviations",
                         _ => "a number greater than 0",
@@ -109,10 +109,10 @@ pub(super) fn loss(at: &Place<'_>, of_kind: &Spec) -> Result<Loss, InputError> {
     Ok(match name {
         LossName::Squares => Loss::Squares,
         LossName::Huber => Loss::Huber {
-            threshold: threshold.map_or(HUBER, |t| t.0),
+            threshold: threshold.unwrap_or(HUBER),
         },
         LossName::StudentT => Loss::StudentT {
-            degrees: degrees.map_or(STUDENT, |d| d.0),
+            degrees: degrees.unwrap_or(STUDENT),
         },
     })
 }
@@ -122,6 +122,6 @@ pub(super) fn noise_model(of_kind: &Spec) -> NoiseModel {
     match of_kind.noise {
         None | Some(ScalarOr::Scalar(CorrelationName::Auto)) => NoiseModel::Auto,
         Some(ScalarOr::Scalar(CorrelationName::White)) => NoiseModel::White,
-        Some(ScalarOr::Map(spec)) => NoiseModel::Autoregressive { order: spec.ar.0 },
+        Some(ScalarOr::Map(spec)) => NoiseModel::Autoregressive { order: spec.ar },
     }
 }

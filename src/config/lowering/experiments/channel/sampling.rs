@@ -2,11 +2,11 @@
 
 use super::super::column_samples;
 use crate::config::lowering::Place;
-use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
 use crate::number_format::count;
 use kmcfit_core::internals::signal::even_spacing;
 use kmcfit_core::internals::signal::{self, SecondOrder};
+use kmcfit_core::model::ExperimentSpec;
 
 /// Order of the filter of a band, run forward and backward.
 const BAND_ORDER: usize = 2;
@@ -69,7 +69,7 @@ pub(super) fn band(
             .expected("no `band`, or a window without gaps"));
     };
     let rate = 1.0 / spacing;
-    let (low, high) = (band.min.map(|f| f.0), band.max.map(|f| f.0));
+    let (low, high) = (band.min, band.max);
     let sections = match (low, high) {
         (Some(low), Some(high)) => signal::band_pass(BAND_ORDER, low, high, rate),
         (Some(low), None) => signal::high_pass(BAND_ORDER, low, rate),
