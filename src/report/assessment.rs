@@ -80,18 +80,6 @@ impl FittedModel<'_> {
         (summary, found)
     }
 
-    /// The doubts of the assessment.
-    pub(super) fn doubts(&self) -> Vec<Doubt> {
-        let assessment = self.run_assessment.assessment.iter();
-        // Of an optimum that identifies no system nothing else is said.
-        let identified = assessment.filter(|a| a.plausibility.unidentified.is_none());
-        let warnings = identified.flat_map(|a| a.plausibility.warnings.iter().cloned());
-        let missing = self.run_assessment.missing_terms.iter();
-        warnings
-            .chain(missing.map(|term| Doubt::MissingTerm(*term)))
-            .collect()
-    }
-
     /// The jumps found in a function, with the levels between them.
     fn jumps(&self, jumps: &Jumps) -> Finding {
         let problem = &self.model.problem;

@@ -217,7 +217,6 @@ impl FittedModel<'_> {
             constraints: self.constraint_summary(),
             identifiability,
             findings,
-            doubts: self.doubts(),
             weights: self.weight_summary(),
             penalties: self.penalty_summaries(),
             attempts: self.fit.attempts.iter().map(attempt_summary).collect(),

@@ -92,6 +92,15 @@ impl Model {
             warnings.any(|w| w.kind == "unmeasured_force" && is_of(w))
         })
     }
+
+    /// Values that stand for missing samples and are not stated, with the names of the experiments.
+    pub fn missing_codes(&self) -> impl Iterator<Item = (String, &serde_json::Value)> {
+        let found = self
+            .warnings
+            .iter()
+            .filter(|w| w.kind == experiments::MISSING_CODES);
+        found.filter_map(|w| Some((w.said("experiment")?, w.quantities.get("codes")?)))
+    }
 }
 
 /// Wall-clock time taken to build a model.

@@ -46,9 +46,6 @@ pub struct ResultDocument {
     /// confidence intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
-    /// The doubts among them, for advice; not in the file.
-    #[serde(skip)]
-    pub(super) doubts: Vec<Doubt>,
     /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
     #[serde(default, skip_serializing_if = "Estimates::is_empty")]
     pub estimates: Estimates,
@@ -328,8 +325,21 @@ impl ResultDocument {
 
     /// True where the fit or the data show two modes.
     pub(super) fn has_two_modes(&self) -> bool {
-        let mut reasons = self.verdict.iter().flat_map(|verdict| &verdict.reasons);
-        reasons.any(|reason| matches!(reason.kind.as_str(), "second_mode" | "two_modes"))
+        self.reasons()
+            .any(|reason| matches!(reason, Doubt::SecondMode { .. }))
+    }
+
+    /// The doubts among the findings of a fit of this process; a file has their sentences alone.
+    pub(super) fn doubts(&self) -> impl Iterator<Item = &Doubt> {
+        self.findings
+            .iter()
+            .filter_map(|finding| finding.doubt.as_ref())
+    }
+
+    /// The doubts among the reasons of the verdict, as [`ResultDocument::doubts`].
+    pub(crate) fn reasons(&self) -> impl Iterator<Item = &Doubt> {
+        let reasons = self.verdict.iter().flat_map(|verdict| &verdict.reasons);
+        reasons.filter_map(|reason| reason.doubt.as_ref())
     }
 
     /// True if a previous fit estimated the standard deviation of a channel, which changes the cost of the last one.

@@ -36,6 +36,7 @@ use kmcfit_core::model::{
 use kmcfit_core::model::{EstimateWord, NumberOrEstimate};
 use std::sync::Arc;
 
+pub(super) use data_checks::MISSING_CODES;
 pub(super) use excitation::shape;
 pub(super) use unit::UNIT_ASSUMED;
 
