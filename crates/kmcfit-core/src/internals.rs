@@ -7,36 +7,32 @@ pub mod assessment {
         ClassicalMethod, CoarseBasis, Doubt, EXACT, EquationErrorIntervals, Estimate,
         EstimateErrors, EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics,
         FunctionSummary, Implausible, ModelTests, NoIntervals, POOR, Parts, Plausibility,
-        RECOVERY_TOLERANCE, RecordError, ResidualPattern, Severity, StepCheck, TruthErrors,
-        Unidentified, VerdictAssumption, VerdictLevel, all_diagnostics, estimates,
-        function_summaries, outliers, pattern, quantities_of_many, verdict_assumptions,
-        verdict_reasons,
+        RecordError, ResidualPattern, Severity, StepCheck, TruthErrors, Unidentified,
+        VerdictAssumption, VerdictLevel, all_diagnostics, estimates, function_summaries, outliers,
+        pattern, quantities_of_many, verdict_assumptions, verdict_reasons,
     };
 }
 pub mod builder {
     pub use crate::builder::{
-        BasisSpec, BuildError, BuildNotice, Builder, ChannelSpec, CoefficientSpec, Contradiction,
-        Knots, PenaltyWeight, Record, Roughness, ScalarSpec, SensorSpec, Start, WeightSearch,
-        listed,
+        BasisSpec, BuildError, Builder, ChannelSpec, CoefficientSpec, Contradiction, Knots,
+        PenaltyWeight, Record, Roughness, ScalarSpec, SensorSpec, Start, WeightSearch, listed,
     };
 }
 pub mod constraints {
     pub use crate::constraints::{
-        Cone, Constraint, ConstraintError, Constraints, RowGroup, Rows, Shape, TOLERANCE,
-        TimeHistory,
+        Cone, Constraint, Constraints, RowGroup, Rows, Shape, TOLERANCE, TimeHistory,
     };
 }
 pub mod diagnostics {
     pub use crate::diagnostics::{
-        ResidualDiagnostics, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult,
-        chi_square_one, detrended, normal_half_width, offset_and_drift, outlier_indices, rms,
-        standard_deviation, student_half_width,
+        ResidualDiagnostics, SIGNIFICANCE, Whiteness, chi_square_one, detrended, normal_half_width,
+        offset_and_drift, outlier_indices, rms, standard_deviation, student_half_width,
     };
 }
 pub mod functions {
     pub use crate::functions::{
-        Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Gram, Parameterization,
-        Penalty, Prior, Ratio, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
+        Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization, Penalty,
+        Prior, Ratio, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
     };
 }
 pub mod host {
@@ -45,23 +41,23 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, Bands, Classification, ClassificationKind, Condition, CovarianceKind, Curve,
-        FunctionClassification, Gain, Quantities, Quantity, RankFinding, Ranked, ScaleFreedom,
+        FunctionClassification, Quantities, Quantity, RankFinding, Ranked, ScaleFreedom,
         ScaleSource, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Target,
-        classify_functions, is_negligible, rank_experiments, scale_source, structural_rank,
+        classify_functions, rank_experiments, scale_source, structural_rank,
     };
     pub use crate::spans::span_words;
 }
 pub mod objective {
-    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
+    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord};
 }
 pub mod problem {
-    pub use crate::problem::{Jumps, Problem, ProblemError, ProblemParts};
+    pub use crate::problem::{Jumps, Problem};
 }
 pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
 }
 pub mod noise {
-    pub use crate::noise::{Autoregression, Correlation, CorrelationLaw, automatic_bandwidth};
+    pub use crate::noise::{Correlation, CorrelationLaw, automatic_bandwidth};
 }
 pub mod number_format {
     pub use crate::number_format::{at_most, number_or_nan, significant};
@@ -75,7 +71,7 @@ pub mod record {
 pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Extremes, Interpolation, Mobility, SecondOrder, Signal, Spectrum,
-        SweepLaw, band_pass, clipped, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
+        SweepLaw, band_pass, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
         high_pass, is_kept_up, jumps, low_pass, median, median_spacing, onset, quantisation,
         spikes, two_forced_modes, two_modes,
     };
@@ -92,18 +88,17 @@ pub mod step {
 pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
-        ActiveGroup, Attempt, BoundedValue, ConditionFailure, EquationBalance, EquationForm,
-        EquationShare, Fit, FitSettings, GridNotice, Initial, IterationEvent, IterationRecord,
-        Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes, Optimality, PathPoint,
-        QpSolver, Reason, Solver, StartProjection, StartStrategy, Status, Stopping,
-        UnsupportedRecord, WeightPath, active_constraints, choose_weight, choose_weight_watched,
+        ActiveGroup, Attempt, EquationBalance, EquationForm, EquationShare, Fit, FitSettings,
+        GridNotice, Initial, IterationEvent, IterationRecord, Measurements, MissingTerm, Observer,
+        OnNodes, Optimality, PathPoint, QpSolver, Solver, StartProjection, StartStrategy, Status,
+        Stopping, WeightPath, active_constraints, choose_weight, choose_weight_watched,
         equation_balance, equation_error, equation_rows, fit, fit_from, fit_on_refined_grids,
         fit_with_noise, fit_with_noise_watched, missing_terms, no_response, predict_validation,
         timed,
     };
 }
 pub mod structure {
-    pub use crate::structure::{CoefficientRow, Ends, Law, Structure};
+    pub use crate::structure::{Ends, Law, Structure};
 }
 pub mod study {
     pub use crate::study::{
@@ -120,7 +115,6 @@ pub mod system {
 }
 pub mod threads {
     pub use crate::threads::{
-        analyses_at_once, available, available_for, both, interruptible, map, share, sharing,
-        spawn_scoped,
+        analyses_at_once, available, available_for, both, interruptible, map, sharing,
     };
 }

@@ -54,7 +54,7 @@ pub use larger_models::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use parts::Parts;
 pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility};
 pub use record_error::RecordError;
-pub use recovery::{RECOVERY_TOLERANCE, TruthErrors};
+pub use recovery::TruthErrors;
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};

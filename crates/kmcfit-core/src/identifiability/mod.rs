@@ -67,7 +67,7 @@ pub(crate) use covariance::is_bayesian;
 pub use covariance_kind::CovarianceKind;
 pub use curve::Curve;
 pub use equation_rows::EquationRows;
-pub use experiments::{Gain, Ranked, rank_experiments};
+pub use experiments::{Ranked, rank_experiments};
 pub(crate) use factorisation::Factorisation;
 pub use quantities::Quantities;
 pub use quantity::{Quantity, Side};

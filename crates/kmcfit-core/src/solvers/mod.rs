@@ -61,7 +61,7 @@ pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use observer::{IterationEvent, Observer};
 pub use optimality::Optimality;
 pub use path::{PathPoint, WeightPath};
-pub use reason::{BoundedValue, ConditionFailure, MissingMeasurement, Reason, UnsupportedRecord};
+pub use reason::Reason;
 pub use settings::{FitSettings, Initial, QpSolver, Solver, StartStrategy};
 pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;
