@@ -159,3 +159,44 @@ fn damping_ratio([c, k, m]: [f64; MOST_COEFFICIENTS]) -> (f64, [f64; MOST_COEFFI
     let zeta = c / root;
     (zeta, [1.0 / root, -0.5 * zeta / k, -0.5 * zeta / m])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::Structure;
+
+    /// One coordinate is the special case of the natural frequencies of a structure, and the derivatives are those of central differences.
+    #[test]
+    fn the_frequency_is_that_of_the_structure_and_the_derivatives_are_right() {
+        let structure = Structure::one(vec![Law::Damping, Law::CubicStiffness, Law::Stiffness]);
+        let (m, c, k) = (2.0, 0.3, 50.0);
+        let nodal = NodalCoefficients {
+            inertias: vec![vec![m; 2]],
+            coefficients: vec![vec![c; 2], vec![7.0; 2], vec![k; 2]],
+        };
+        let found = Ratio::NaturalFrequency.at_nodes(structure.laws(), &nodal);
+        let square = structure.eigenvalues(&[m, c, 7.0, k]).unwrap()[0];
+        assert!((found[1] - square.sqrt() / TAU).abs() < 1e-15);
+        assert!(
+            Ratio::DampingRatio
+                .at_nodes(&[Law::Stiffness], &nodal)
+                .is_empty()
+        );
+        for ratio in Ratio::ALL {
+            let at = match ratio {
+                Ratio::DampingRatio => [c, k, m],
+                _ => [k, m, 0.0],
+            };
+            let (_, slopes) = ratio.formula()(at);
+            for (j, slope) in slopes.into_iter().enumerate() {
+                let moved = |by: f64| {
+                    let mut moved = at;
+                    moved[j] += by;
+                    ratio.formula()(moved).0
+                };
+                let expected = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((slope - expected).abs() < 1e-8, "{ratio:?} {j}");
+            }
+        }
+    }
+}
