@@ -3,7 +3,8 @@
 use kmcfit::tables::Table;
 use kmcfit_core::Bands;
 use kmcfit_core::Interpolation;
-use kmcfit_core::{Builder, CoefficientSpec, Record};
+use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::{Builder, Record};
 use std::error::Error;
 
 /// Value and standard error of mass (kg), damping (N s/m) and stiffness (N/m).

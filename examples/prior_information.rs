@@ -4,7 +4,8 @@
 use kmcfit::tables::Table;
 use kmcfit_core::CoefficientKind;
 use kmcfit_core::Method;
-use kmcfit_core::{Builder, CoefficientSpec, Record};
+use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::{Builder, Record};
 use kmcfit_core::{Constraint, Shape};
 use std::error::Error;
 

@@ -2,7 +2,8 @@
 // values are needed.
 
 use kmcfit_core::internals::identifiability::{ScaleFreedom, structural_rank};
-use kmcfit_core::{Builder, CoefficientSpec, Record};
+use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::{Builder, Record};
 use kmcfit_core::{Excitation, Grid, Law, Method, NodalCoefficients, State, Structure, System};
 use std::error::Error;
 

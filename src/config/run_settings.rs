@@ -8,8 +8,7 @@ use crate::units::ScaledUnit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::Interpolation;
 use kmcfit_core::model::ScalarOr;
-use kmcfit_core::model::{ColumnId, NumberOrEstimate};
-use kmcfit_core::model::{ColumnRef, DelayValue, EstimateValue, ExperimentSpec, SensorKeys};
+use kmcfit_core::model::{ColumnId, ColumnRef, DelayValue, ExperimentSpec, ScalarSpec, SensorSpec};
 
 /// Settings of the first record of a run with a given input; those of an ideal sensor by default.
 #[derive(Debug, Clone, Default)]
@@ -151,11 +150,11 @@ impl RunSettings {
         let given = spec.and_then(|spec| sensor_of(spec, kind));
         let name = |part: &str| format!("{part} of the {} of {}", kind.name(), self.name);
         let value =
-            |pick: &dyn Fn(&SensorKeys) -> Option<&EstimateValue>, part: &str, default| match given
+            |pick: &dyn Fn(&SensorSpec) -> Option<&ScalarSpec>, part: &str, default| match given
                 .and_then(pick)
             {
                 None => SensorValue::Known(default),
-                Some(ScalarOr::Scalar(NumberOrEstimate::Number(x))) => SensorValue::Known(*x),
+                Some(ScalarSpec::Known(x)) => SensorValue::Known(*x),
                 Some(_) => SensorValue::Estimated(name(part)),
             };
         let (input, input_delay) = self.input_delay();
@@ -193,7 +192,7 @@ impl RunSettings {
 fn delay(given: Option<&DelayValue>, name: impl Fn() -> String) -> SensorValue {
     match given {
         None => SensorValue::Known(0.0),
-        Some(ScalarOr::Scalar(NumberOrEstimate::Number(x))) => SensorValue::Known(*x),
+        Some(DelayValue::Known(x)) => SensorValue::Known(*x),
         Some(_) => SensorValue::Estimated(name()),
     }
 }

@@ -77,12 +77,12 @@ fn each_record_has_the_estimates_of_its_own_fit() {
         assert_eq!(
             keys,
             [
-                "error",
-                "estimates",
                 "record",
                 "sha256",
+                "estimates",
                 "verdict",
-                "warnings"
+                "warnings",
+                "error"
             ]
         );
         let data = format!("experiments.0.data={name}");

@@ -6,6 +6,7 @@ use crate::program::{is_long, program};
 use crate::workbench::repository;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -28,7 +29,8 @@ fn lines(model: &str, folder: &Path) -> String {
     let _ = writeln!(out, "{model}\tcost\t{}", number(&result["cost"]["final"]));
     let level = result["verdict"]["level"].as_str().unwrap_or("-");
     let _ = writeln!(out, "{model}\tverdict\t{level}");
-    for (name, estimate) in result["estimates"].as_object().expect("estimates") {
+    let estimates = result["estimates"].as_object().expect("estimates").iter();
+    for (name, estimate) in estimates.collect::<BTreeMap<_, _>>() {
         let numbers = [
             &estimate["value"],
             &estimate["range"][0],

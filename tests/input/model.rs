@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
+use kmcfit_core::WeightRule;
 use kmcfit_core::model::ScalarOr;
 use kmcfit_core::model::{
-    BasisName, ByCoefficient, FitMethod, FunctionSpec, InitialSpec, PenaltyKeys, PenaltyKind,
-    Shared, WeightRuleName,
+    BasisName, ByCoefficient, CoefficientSpec, FitMethod, InitialSpec, PenaltyKind, PenaltySpec,
+    Shared,
 };
 use kmcfit_core::model::{
-    Bound, ColumnId, KnotSpec, KnownValue, Nodes, NumberOrColumn, NumberOrEstimate, SigmaValue,
+    Bound, ColumnId, KnotSpec, KnownValue, Nodes, NumberOrColumn, ScalarSpec, SigmaValue,
     StartSpec, WeightChoice,
 };
 use kmcfit_core::{CoefficientKind, GradientKind, Method};
@@ -55,7 +56,7 @@ functions:
   stiffness: {basis: nodal}
 ";
 
-fn of(functions: &ByCoefficient<Shared>, kind: CoefficientKind) -> FunctionSpec {
+fn of(functions: &ByCoefficient<Shared>, kind: CoefficientKind) -> CoefficientSpec {
     functions.get(kind).expect("a required function").clone()
 }
 
@@ -160,15 +161,15 @@ fn shapes_limits_and_penalties_are_read() {
     assert_eq!(damping.basis, Some(BasisName::BSpline));
     let times = [0.0, 1.5, 3.0].to_vec();
     assert_eq!(damping.knots, Some(KnotSpec::Times(times)));
-    let tikhonov = |order, weight, reference| PenaltyKeys {
+    let tikhonov = |order, weight, reference| PenaltySpec {
         kind: PenaltyKind::Tikhonov,
         order: Some(order),
         weight,
         reference,
     };
     let two: Vec<_> = damping.penalty.iter().flat_map(|s| s.iter()).collect();
-    let slope = tikhonov(1, WeightChoice::Rule(WeightRuleName::Discrepancy), None);
-    let variation = PenaltyKeys {
+    let slope = tikhonov(1, WeightChoice::Rule(WeightRule::Discrepancy), None);
+    let variation = PenaltySpec {
         kind: PenaltyKind::TotalVariation,
         order: None,
         weight: WeightChoice::Number(2.0),
@@ -184,7 +185,7 @@ fn shapes_limits_and_penalties_are_read() {
     let value = tikhonov(0, WeightChoice::Number(1e-3), Some(reference));
     let curvature = tikhonov(
         2,
-        WeightChoice::Rule(WeightRuleName::RestrictedLikelihood),
+        WeightChoice::Rule(WeightRule::RestrictedLikelihood),
         None,
     );
     let expected = [("[0]".to_owned(), &value), ("[1]".to_owned(), &curvature)];
@@ -255,7 +256,7 @@ fn known(initial: &InitialSpec) -> [f64; 2] {
         panic!("a state")
     };
     [&state.displacement, &state.velocity].map(|value| match value {
-        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => *number,
+        ScalarSpec::Known(number) => *number,
         other => panic!("{other:?}"),
     })
 }

@@ -2,14 +2,13 @@
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::tables::Table;
-use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec, Start,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel};
 use kmcfit_core::internals::system::Method;
+use kmcfit_core::model::{BasisName, CoefficientSpec, KnotSpec, ScalarSpec, StartSpec};
 use std::path::Path;
 
 /// The columns of a file in `data/`.
@@ -285,10 +284,10 @@ fn invalid_parts_are_refused_with_their_key() {
             "functions.mass.start: the list does not fit the basis\n  found: 0 numbers for `polynomial`",
         ),
         (
-            mass(CoefficientSpec::estimated(
-                BasisSpec::Polynomial { degree: usize::MAX },
-                Start::Constant(1.0),
-            )),
+            mass(CoefficientSpec {
+                degree: Some(usize::MAX),
+                ..CoefficientSpec::polynomial(&[1.0])
+            }),
             "found: 18446744073709551615 on 2000 nodes",
         ),
         (
@@ -297,23 +296,23 @@ fn invalid_parts_are_refused_with_their_key() {
         ),
         (
             mass(CoefficientSpec::estimated(
-                BasisSpec::Constant,
-                Start::Parameters(vec![1.0, 2.0]),
+                BasisName::Constant,
+                StartSpec::List(vec![1.0, 2.0]),
             )),
             "found: 2 numbers for `constant`\n  expected: 1 number, the value at all times",
         ),
         (
-            mass(CoefficientSpec::estimated(
-                BasisSpec::PiecewiseLinear(Knots::Times(vec![0.0, 30.0])),
-                Start::Constant(1.0),
-            )),
+            mass(CoefficientSpec::piecewise_linear(2, 1.0).knots(KnotSpec::Times(vec![0.0, 30.0]))),
             "functions.mass.knots[1]: this knot lies outside the record\n  found: 30\n  expected: a time from 0 s to 25 s",
         ),
         (
-            mass(CoefficientSpec::estimated(
-                BasisSpec::PiecewiseLinear(Knots::Times(vec![0.0, f64::NAN, 25.0])),
-                Start::Constant(1.0),
-            )),
+            mass(
+                CoefficientSpec::piecewise_linear(2, 1.0).knots(KnotSpec::Times(vec![
+                    0.0,
+                    f64::NAN,
+                    25.0,
+                ])),
+            ),
             "functions.mass.knots[1]: this knot lies outside the record\n  found: NaN",
         ),
         (

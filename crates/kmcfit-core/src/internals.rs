@@ -14,8 +14,8 @@ pub mod assessment {
 }
 pub mod builder {
     pub use crate::builder::{
-        BasisSpec, BuildError, Builder, ChannelSpec, CoefficientSpec, Contradiction, Knots,
-        PenaltyWeight, Record, Roughness, ScalarSpec, SensorSpec, Start, WeightSearch, listed,
+        BuildError, BuildNotice, Builder, ChannelSpec, Contradiction, Record, UNKNOWN_MASS,
+        WeightSearch, listed,
     };
 }
 pub mod constraints {

@@ -23,7 +23,8 @@
 //! A system whose mass falls along a line is simulated, and identified from its response:
 //!
 //! ```
-//! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record, Status};
+//! use kmcfit_core::{Builder, CoefficientKind, Record, Status};
+//! use kmcfit_core::model::CoefficientSpec;
 //! use kmcfit_core::{Grid, Law, Method, NodalCoefficients, State, Structure, System};
 //!
 //! // The system: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
@@ -86,10 +87,7 @@ mod threads;
 // The public API, by topic. `tests/api.rs` holds it to `api.txt`: it grows only on purpose.
 
 // Problems.
-pub use builder::{
-    BasisSpec, BuildError, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec,
-    SensorSpec, Start,
-};
+pub use builder::{BuildError, Builder, ChannelSpec, Record};
 pub use constraints::{Constraint, Shape, TimeHistory};
 pub use functions::{CoefficientKind, Prior, Ratio, WeightRule};
 pub use problem::{Problem, ProblemError};

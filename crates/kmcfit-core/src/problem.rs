@@ -410,7 +410,8 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     /// One estimate serves a problem, and its copies until a part of theirs is changed.
     #[test]

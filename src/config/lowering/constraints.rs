@@ -1,35 +1,25 @@
-//! Constraints of a model file, as constraints of the builder.
-
-mod entry;
+//! Constraints of a model file, with their columns at the nodes.
 
 use super::Place;
+use super::functions::read_column;
 use crate::config::ModelFile;
 use crate::error::InputError;
-use kmcfit_core::internals::builder::Builder;
 use kmcfit_core::internals::system::Grid;
+use kmcfit_core::model::ConstraintSpec;
 
-/// Adds the constraints of the model to the builder. Bounds of a function are part of its specification.
-pub(super) fn add(
+/// The constraints of the model; bounds of a function are part of its specification.
+pub(super) fn all(
     file: &ModelFile,
     grid: &Grid,
-    mut builder: Builder,
-) -> Result<Builder, InputError> {
-    let Some(list) = &file.spec.constraints else {
-        return Ok(builder);
-    };
-    if list.is_empty() {
-        return Err(file
-            .error_at("constraints", "there is no constraint")
-            .found("an empty list")
-            .expected("at least one constraint, or no `constraints`"));
-    }
-    for (i, spec) in list.iter().enumerate() {
-        let soft = spec.soft;
-        for (key, constraint) in
-            entry::read(Place::new(file, format!("constraints[{i}]")), grid, spec)?
-        {
-            builder = builder.constraint(key, constraint, soft);
+) -> Result<Option<Vec<ConstraintSpec>>, InputError> {
+    let mut list = file.spec.constraints.clone();
+    for (i, spec) in list.iter_mut().flatten().enumerate() {
+        for (name, bound) in [("min", &mut spec.min), ("max", &mut spec.max)] {
+            let at = Place::new(file, format!("constraints[{i}].{name}"));
+            bound
+                .iter_mut()
+                .try_for_each(|bound| read_column(&at, grid, bound))?;
         }
     }
-    Ok(builder)
+    Ok(list)
 }

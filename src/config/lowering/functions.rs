@@ -1,21 +1,18 @@
-//! Coefficient functions of a model file as specifications of the builder, and the true coefficients.
+//! Coefficient functions of a model file with their columns at the nodes, and the true coefficients.
 
+use super::Place;
 use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
-use crate::config::lowering::Place;
 use crate::error::InputError;
-use kmcfit_core::internals::builder::{self, BasisSpec, CoefficientSpec, PenaltyWeight, Roughness};
+use kmcfit_core::internals::builder::UNKNOWN_MASS;
 use kmcfit_core::internals::constraints::TimeHistory;
-use kmcfit_core::internals::functions::{self, CoefficientKind};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{ScaleSource, scale_source};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
 use kmcfit_core::model::{
-    self as config, BasisName, ByCoefficient, ColumnSpec, ExperimentSpec, FunctionSpec,
-    PenaltyKind, WeightRuleName,
-};
-use kmcfit_core::model::{
-    Bound, KnotSpec, KnownValue, KnownValueMap, NumberOrColumn, StartSpec, WeightChoice,
+    Bound, ByCoefficient, CoefficientSpec, ColumnSpec, ExperimentSpec, KnownValue, KnownValueMap,
+    NumberOrColumn, OneOrList, StartSpec,
 };
 
 /// Default lower limit of a mass, as a share of its smallest start value: a fit can otherwise end with a mass of nearly zero, whose
@@ -23,7 +20,7 @@ use kmcfit_core::model::{
 const LEAST_MASS: f64 = 1e-3;
 
 /// A coefficient function of the model file: kind and settings.
-pub(super) type Given<'a> = (CoefficientKind, &'a FunctionSpec);
+pub(super) type Given<'a> = (CoefficientKind, &'a CoefficientSpec);
 
 /// The functions common to all experiments, mass first.
 pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
@@ -55,164 +52,84 @@ pub(super) struct Defaults<'a> {
     pub starts: Option<&'a RecordStarts>,
 }
 
-/// The specification of the function at `key`; if the fit is limited, an estimated mass without `min` has a lower bound of
-/// [`LEAST_MASS`] times its smallest start value.
+/// The function at `key` with its columns at the nodes; where a start is left out, that of the record; if the fit is limited, an
+/// estimated mass without `min` has a lower bound of [`LEAST_MASS`] times its smallest start value.
 pub(super) fn specification(
     at: &Place<'_>,
     grid: &Grid,
     (kind, given): Given<'_>,
     defaults: Defaults<'_>,
 ) -> Result<CoefficientSpec, InputError> {
-    let is_own = !at.key.starts_with("functions.");
-    check_basis_keys(at, given)?;
-    let bound = |name: &str, given: &Option<Bound>| match given {
-        None | Some(Bound::None(_)) => Ok(None),
-        Some(Bound::At(given)) => history(&at.below(name), grid, given).map(Some),
+    let mut spec = given.clone();
+    for (name, known) in [
+        ("fixed", &mut spec.fixed),
+        ("known_part", &mut spec.known_part),
+    ] {
+        if let Some(KnownValue::Map(KnownValueMap {
+            value: None,
+            sigma: None,
+            data: Some(data),
+            column: Some(column),
+        })) = known
+        {
+            let (data, column) = (data.clone(), column.clone());
+            let values = column_history(&at.below(name), grid, &ColumnSpec { data, column })?;
+            *known = Some(KnownValue::History(values));
+        }
+    }
+    for (name, bound) in [("min", &mut spec.min), ("max", &mut spec.max)] {
+        if let Some(Bound::At(values)) = bound {
+            read_column(&at.below(name), grid, values)?;
+        }
+    }
+    if let Some(StartSpec::Column(column)) = &spec.start {
+        spec.start = Some(StartSpec::Nodal(self::column(
+            &at.below("start"),
+            grid,
+            column,
+        )?));
+    }
+    let penalties = match &mut spec.penalty {
+        None => &mut [],
+        Some(OneOrList::One(one)) => std::slice::from_mut(one),
+        Some(OneOrList::List(list)) => list.as_mut_slice(),
     };
-    let mut spec = match (&given.fixed, &given.start, given.basis) {
-        (Some(_), Some(_), _) => {
-            return Err(at
-                .error_in("start", "`fixed` and `start` exclude each other")
-                .expected("either `fixed` or `start`"));
+    for (i, penalty) in penalties.iter_mut().enumerate() {
+        if let Some(reference) = &mut penalty.reference {
+            let suffix = given
+                .penalty
+                .as_ref()
+                .map(|list| list.suffix(i))
+                .unwrap_or_default();
+            read_column(
+                &at.below(&format!("penalty{suffix}.reference")),
+                grid,
+                reference,
+            )?;
         }
-        (Some(_), None, Some(_)) => {
-            return Err(at
-                .error_in("basis", "`fixed` and `basis` exclude each other")
-                .expected("either `fixed`, or `basis` with `start`"));
-        }
-        (Some(fixed), None, None) => {
-            refuse_negative_stiffness(at, kind, fixed)?;
-            known(&at.below("fixed"), grid, fixed)?
-        }
-        (None, None, None) if is_own && is_known_part_alone(given) => CoefficientSpec::shared(),
-        (None, None, basis_name) => {
-            let mut starts = defaults.starts.into_iter().flatten();
-            let start = starts.find(|(of, _)| *of == kind);
-            let Some((basis_name, (_, start))) = basis_name.zip(start) else {
-                return Err(at
-                    .error("this function has neither a start nor a fixed value")
-                    .expected("`start` for a function to be fitted, `fixed` for a known one")
-                    .hint("mass, damping and stiffness of a fit start from the record"));
-            };
-            let basis = basis(at, given, basis_name)?;
-            CoefficientSpec::estimated(basis, builder::Start::Constant(*start))
-        }
-        (None, Some(_), None) => {
-            return Err(at
-                .error("a function to be fitted needs a basis")
-                .expected(format!("`basis`, one of {}", basis_names())));
-        }
-        (None, Some(given_start), Some(kind)) => {
-            let basis = basis(at, given, kind)?;
-            let start = start(&at.below("start"), grid, kind, given_start)?;
-            CoefficientSpec::estimated(basis, start)
-        }
-    };
-    spec = spec.bounds(bound("min", &given.min)?, bound("max", &given.max)?);
-    if given.min.is_none() && defaults.is_limited && kind == CoefficientKind::MASS {
-        spec = spec.min_of_start(LEAST_MASS);
     }
-    for (place, given) in given.penalty.iter().flat_map(|list| list.iter()) {
-        spec = spec.penalty(penalty(&at.below(&format!("penalty{place}")), grid, given)?);
+    if spec.start.is_none() && spec.fixed.is_none() {
+        let mut starts = defaults.starts.into_iter().flatten();
+        let start = starts.find(|(of, _)| *of == kind && spec.basis.is_some());
+        spec.start = start.map(|(_, start)| StartSpec::Number(*start));
     }
-    if let Some(part) = &given.known_part {
-        spec = spec.known_part(known(&at.below("known_part"), grid, part)?);
+    if defaults.is_limited && kind == CoefficientKind::MASS {
+        spec.min_of_start = Some(LEAST_MASS);
     }
-    Ok(match given.width {
-        Some(width) => spec.width(width),
-        None => spec,
-    })
+    Ok(spec)
 }
 
-/// Refuses a fixed negative stiffness without a stiffening term: every motion would grow without end.
-fn refuse_negative_stiffness(
+/// Replaces a column of a file by its values at the nodes.
+pub(super) fn read_column(
     at: &Place<'_>,
-    kind: CoefficientKind,
-    fixed: &KnownValue,
+    grid: &Grid,
+    given: &mut NumberOrColumn,
 ) -> Result<(), InputError> {
-    let value = match fixed {
-        KnownValue::Number(value) => Some(*value),
-        KnownValue::Map(map) => map.value,
-        KnownValue::Unknown(_) => None,
-    };
-    let functions = &at.file.spec.functions;
-    let stiffening = [
-        CoefficientKind::CUBIC_STIFFNESS,
-        CoefficientKind::QUINTIC_STIFFNESS,
-    ];
-    let is_stiffened = stiffening.iter().any(|kind| functions.get(*kind).is_some());
-    match value.filter(|value| *value < 0.0 && kind == CoefficientKind::STIFFNESS) {
-        Some(value) if !is_stiffened => Err(at
-            .error_in(
-                "fixed",
-                "a negative stiffness without a term that stiffens: every motion grows without end",
-            )
-            .found(value)
-            .expected("a positive stiffness, or `cubic_stiffness` beside it")),
-        _ => Ok(()),
+    if let NumberOrColumn::Column(column) = given {
+        *given = NumberOrColumn::History(column_history(at, grid, column)?);
     }
+    Ok(())
 }
-
-/// True for a function of an experiment that has a known part and no other key.
-fn is_known_part_alone(given: &FunctionSpec) -> bool {
-    let has_other = given.min.is_some()
-        || given.max.is_some()
-        || given.penalty.is_some()
-        || given.width.is_some();
-    given.known_part.is_some() && !has_other
-}
-
-/// Known values at `key`.
-fn known(at: &Place<'_>, grid: &Grid, given: &KnownValue) -> Result<CoefficientSpec, InputError> {
-    let map = match given {
-        KnownValue::Number(value) => return Ok(CoefficientSpec::fixed(*value)),
-        KnownValue::Unknown(_) if at.key == UNKNOWN_MASS => return Ok(CoefficientSpec::fixed(1.0)),
-        KnownValue::Unknown(_) => {
-            return Err(at.error("only the mass can be unknown")
-                .found("`unknown`")
-                .expected("a value, or `basis` for a function to be fitted")
-                .hint("all coefficients are ratios to an unknown mass: `functions: {mass: {fixed: unknown}}`"));
-        }
-        KnownValue::Map(map) => map,
-    };
-    let KnownValueMap {
-        value,
-        sigma,
-        data,
-        column,
-    } = map;
-    match (value, sigma, data, column) {
-        (Some(value), Some(sigma), None, None) => Ok(CoefficientSpec::uncertain(*value, *sigma)),
-        (None, None, Some(data), Some(name)) => {
-            let column = NumberOrColumn::Column(ColumnSpec {
-                data: data.clone(),
-                column: name.clone(),
-            });
-            history(at, grid, &column).map(CoefficientSpec::known)
-        }
-        _ => {
-            let keys = [
-                ("value", value.is_some()),
-                ("sigma", sigma.is_some()),
-                ("data", data.is_some()),
-                ("column", column.is_some()),
-            ];
-            let given = keys.iter().filter(|(_, is_given)| *is_given);
-            let given: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
-            let found = match given.is_empty() {
-                true => "an empty map".to_owned(),
-                false => given.join(" and "),
-            };
-            Err(at
-                .error("neither a value with its standard deviation nor a column of a file")
-                .found(found)
-                .expected("{value: 4.5, sigma: 0.02}, or {data: file.csv, column: name}"))
-        }
-    }
-}
-
-/// Key of a mass that is `unknown`.
-const UNKNOWN_MASS: &str = "functions.mass.fixed";
 
 /// True if the model states that the mass is unknown.
 pub(super) fn has_unknown_mass(file: &ModelFile) -> bool {
@@ -247,146 +164,16 @@ pub(super) fn check_unknown_mass(file: &ModelFile, problem: &Problem) -> Result<
     }
 }
 
-/// The additional key of a basis.
-fn own_key(kind: BasisName) -> Option<&'static str> {
-    match kind {
-        BasisName::Nodal | BasisName::Constant => None,
-        BasisName::Polynomial => Some("degree"),
-        BasisName::PiecewiseConstant | BasisName::PiecewiseLinear | BasisName::BSpline => {
-            Some("knots")
-        }
-    }
-}
-
-/// Refuses `knots` and `degree` where the basis does not use them.
-fn check_basis_keys(at: &Place<'_>, spec: &FunctionSpec) -> Result<(), InputError> {
-    let given = [
-        ("knots", spec.knots.is_some()),
-        ("degree", spec.degree.is_some()),
-    ];
-    let own = spec.basis.and_then(own_key);
-    let Some((unused, _)) = given.iter().find(|(k, given)| *given && own != Some(*k)) else {
-        return Ok(());
-    };
-    let problem = match spec.basis {
-        Some(kind) => format!("the basis `{kind}` does not use this key"),
-        None => "this key needs a basis that uses it".to_owned(),
-    };
-    Err((at.error_in(unused, problem))
-        .found(format!("`{unused}`"))
-        .expected(match (spec.basis, own) {
-            (_, Some(own)) => format!("`{own}`"),
-            (Some(_), None) => "neither `knots` nor `degree`".to_owned(),
-            (None, None) => "`basis` beside it".to_owned(),
-        })
-        .hint(match *unused {
-            "knots" => "piecewise-constant, piecewise-linear and b-spline have knots",
-            _ => "polynomial has a degree",
-        }))
-}
-
-/// The basis of a function to be fitted.
-fn basis(at: &Place<'_>, spec: &FunctionSpec, kind: BasisName) -> Result<BasisSpec, InputError> {
-    let missing = |what: &str, expected: &str| {
-        at.error(format!("the basis `{kind}` needs {what}"))
-            .expected(expected)
-    };
-    let knots = || match &spec.knots {
-        Some(KnotSpec::Count(count)) => Ok(builder::Knots::Count(*count)),
-        Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(times.clone())),
-        Some(KnotSpec::Auto(_)) => Ok(builder::Knots::Auto),
-        None => Err(missing(
-            "knots",
-            "`knots`: `auto`, the number of equally spaced knots, or a list of times in s",
-        )),
-    };
-    Ok(match kind {
-        BasisName::Nodal => BasisSpec::Nodal,
-        BasisName::Constant => BasisSpec::Constant,
-        BasisName::PiecewiseConstant => BasisSpec::PiecewiseConstant(knots()?),
-        BasisName::PiecewiseLinear => BasisSpec::PiecewiseLinear(knots()?),
-        BasisName::BSpline => BasisSpec::BSpline(knots()?),
-        BasisName::Polynomial => {
-            let degree = spec.degree.ok_or_else(|| {
-                missing("a degree", "`degree`: an integer, for instance `degree: 1`")
-            })?;
-            BasisSpec::Polynomial { degree }
-        }
-    })
-}
-
-fn basis_names() -> String {
-    let names: Vec<&str> = BasisName::ALL.iter().map(|basis| basis.name()).collect();
-    names.join(", ")
-}
-
-fn start(
+/// A column named by `key`, interpolated at the nodes.
+fn column_history(
     at: &Place<'_>,
     grid: &Grid,
-    kind: BasisName,
-    given: &StartSpec,
-) -> Result<builder::Start, InputError> {
-    match given {
-        StartSpec::Number(value) => Ok(builder::Start::Constant(*value)),
-        StartSpec::List(_) if kind == BasisName::BSpline => Err(at
-            .error("`start` of the basis `b-spline` must be one number")
-            .found("a list")
-            .expected("a finite number, or a column: {data: file.csv, column: name}")),
-        StartSpec::List(values) => Ok(builder::Start::Parameters(values.clone())),
-        StartSpec::Column(c) => Ok(builder::Start::Nodal(column(at, grid, c)?)),
-    }
-}
-
-fn penalty(
-    at: &Place<'_>,
-    grid: &Grid,
-    given: &config::PenaltyKeys,
-) -> Result<Roughness, InputError> {
-    if given.kind == PenaltyKind::TotalVariation {
-        return total_variation(at, given);
-    }
-    let Some(order) = given.order else {
-        return Err(at
-            .error("the key `order` is missing")
-            .found("a penalty of the kind `tikhonov` alone")
-            .expected("for instance `order: 2`"));
-    };
-    let reference = given.reference.as_ref();
-    let reference = reference.map(|r| history(&at.below("reference"), grid, r));
-    Ok(Roughness::Tikhonov {
-        order,
-        weight: penalty_weight(given.weight),
-        reference: reference.transpose()?,
+    given: &ColumnSpec,
+) -> Result<TimeHistory, InputError> {
+    Ok(TimeHistory::Nodal {
+        name: format!("{} of {}", given.column, given.data),
+        values: column(at, grid, given)?,
     })
-}
-
-/// A penalty on total variation; refuses keys other than the weight.
-fn total_variation(at: &Place<'_>, given: &config::PenaltyKeys) -> Result<Roughness, InputError> {
-    let others = [
-        ("order", given.order.is_some()),
-        ("reference", given.reference.is_some()),
-    ];
-    if let Some((other, _)) = others.iter().find(|(_, given)| *given) {
-        return Err(at
-            .error_in(other, "a penalty on total variation has only a weight")
-            .found(format!("`{other}` beside `kind: tv`"))
-            .expected(format!("no `{other}`, or `kind: tikhonov`")));
-    }
-    let weight = penalty_weight(given.weight);
-    Ok(Roughness::TotalVariation { weight })
-}
-
-fn penalty_weight(given: WeightChoice) -> PenaltyWeight {
-    let rule = match given {
-        WeightChoice::Number(weight) => return PenaltyWeight::Given(weight),
-        WeightChoice::Rule(WeightRuleName::Period) => return PenaltyWeight::Period,
-        WeightChoice::Rule(WeightRuleName::Discrepancy) => functions::WeightRule::Discrepancy,
-        WeightChoice::Rule(WeightRuleName::RestrictedLikelihood) => {
-            functions::WeightRule::RestrictedLikelihood
-        }
-        WeightChoice::Rule(WeightRuleName::Bic) => functions::WeightRule::Bic,
-    };
-    PenaltyWeight::Rule(rule)
 }
 
 /// A constant, or a column named by `key`, interpolated at the nodes.
@@ -397,10 +184,8 @@ pub(super) fn history(
 ) -> Result<TimeHistory, InputError> {
     match given {
         NumberOrColumn::Number(value) => Ok(TimeHistory::Constant(*value)),
-        NumberOrColumn::Column(c) => Ok(TimeHistory::Nodal {
-            name: format!("{} of {}", c.column, c.data),
-            values: column(at, grid, c)?,
-        }),
+        NumberOrColumn::Column(column) => column_history(at, grid, column),
+        NumberOrColumn::History(values) => Ok(values.clone()),
     }
 }
 

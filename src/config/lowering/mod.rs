@@ -19,7 +19,6 @@ use place::Place;
 pub use refinement::AutomaticGrid;
 pub use study::StudyPlan;
 
-use super::key_positions::{key_path, locate};
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
@@ -166,7 +165,11 @@ fn builder(
         builder = builder.record(record);
         notes.push(of_record);
     }
-    Ok((constraints::add(file, grid, builder)?, notes))
+    if let Some(list) = constraints::all(file, grid)? {
+        let built = builder.constraints(&list, grid);
+        builder = built.map_err(|error| input_error(file, error))?;
+    }
+    Ok((builder, notes))
 }
 
 /// An error of the builder at the place of its key in the file.
@@ -175,23 +178,13 @@ fn input_error(file: &ModelFile, error: BuildError) -> InputError {
         Some(contradiction) => contradicted(file, contradiction, &error.problem),
         None => InputError {
             found: error.found,
-            ..file.error_at(&written(file, &error.key), error.problem)
+            ..file.error_at(&error.key, error.problem)
         },
     };
     InputError {
         expected: error.expected,
         hint: error.hint,
         ..placed
-    }
-}
-
-/// The key as written in the file: a single map in place of a list has no index.
-fn written(file: &ModelFile, key: &str) -> String {
-    let alone = key.replace("penalty[0]", "penalty");
-    let depth = |key: &str| locate(file.effective_text(), &key_path(key)).depth;
-    match alone != key && depth(&alone) >= depth(key) {
-        true => alone,
-        false => key.to_owned(),
     }
 }
 

@@ -88,7 +88,8 @@ fn stated(file: &ModelFile, grid: &Grid, kind: CoefficientKind) -> Option<f64> {
         (None, Some(StartSpec::Number(number))) => Some(*number),
         (None, Some(StartSpec::List(values))) => values.first().copied(),
         (None, Some(StartSpec::Column(column))) => of_column("start", column.clone()),
-        (None, None) => None,
+        // A file states columns, not yet values at the nodes.
+        (Some(KnownValue::History(_)), _) | (None, Some(StartSpec::Nodal(_)) | None) => None,
     }
 }
 

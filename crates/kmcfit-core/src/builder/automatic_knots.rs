@@ -1,9 +1,8 @@
 //! Automatic knots: a spline that is richer than the data need, and a penalty whose weight they choose.
 
-use super::basis::{BasisSpec, Knots};
-use super::coefficient::{CoefficientSpec, PenaltyWeight, Roughness};
 use super::{BuildError, Builder, Record};
 use crate::functions::WeightRule;
+use crate::model::{KnotSpec, PenaltySpec, WeightChoice};
 use crate::problem::FEW_PARAMETERS;
 use crate::record::Weighting;
 use crate::signal::{Spectrum, median_spacing};
@@ -34,8 +33,8 @@ impl Builder {
             return Ok(next);
         };
         let weight = match (self.is_equation_error(), self.without_likelihood()) {
-            (true, _) => PenaltyWeight::Period,
-            (false, None) => PenaltyWeight::Rule(WeightRule::RestrictedLikelihood),
+            (true, _) => WeightRule::Period,
+            (false, None) => WeightRule::RestrictedLikelihood,
             (false, Some(record)) => {
                 let problem = "automatic knots need a likelihood of the samples";
                 return Err(BuildError::new(key, problem)
@@ -68,13 +67,10 @@ impl Builder {
         let own = next.records.iter_mut().flat_map(|r| &mut r.coefficients);
         for (_, spec) in next.coefficients.iter_mut().chain(own) {
             if spec.has_automatic_knots() {
-                spec.set_knots(intervals + 1);
-                if spec.penalties.is_empty() {
-                    spec.penalties.push(Roughness::Tikhonov {
-                        order: ORDER,
-                        weight,
-                        reference: None,
-                    });
+                spec.knots = Some(KnotSpec::Count(intervals + 1));
+                if spec.penalties().is_empty() {
+                    let penalty = PenaltySpec::tikhonov(ORDER, WeightChoice::Rule(weight));
+                    *spec = spec.clone().penalty(penalty);
                 }
             }
         }
@@ -102,24 +98,6 @@ impl Builder {
         match self.is_simulation {
             true => None,
             false => self.records.iter().position(is_without),
-        }
-    }
-}
-
-impl CoefficientSpec {
-    fn has_automatic_knots(&self) -> bool {
-        self.basis().and_then(BasisSpec::knots) == Some(&Knots::Auto)
-    }
-}
-
-impl BasisSpec {
-    /// Knots of a basis that has them.
-    fn knots(&self) -> Option<&Knots> {
-        match self {
-            Self::PiecewiseConstant(knots)
-            | Self::PiecewiseLinear(knots)
-            | Self::BSpline(knots) => Some(knots),
-            Self::Nodal | Self::Constant | Self::Polynomial { .. } => None,
         }
     }
 }

@@ -1,67 +1,89 @@
-//! Specification of a basis, and its construction on a grid.
+//! A basis on a grid.
 
 use super::BuildError;
 use crate::functions::basis::uniform_knots;
 use crate::functions::{Basis, Design, Gram};
+use crate::model::{BasisName, CoefficientSpec, KnotSpec};
 use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
 
 /// Largest distance, in steps, of the first and last knot from the ends of the record.
 const SAME_TIME: f64 = 1e-6;
 
-/// Knots of a basis.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Knots {
-    /// Number of knots, equally spaced over the record, both ends included.
-    Count(usize),
-    /// Times of the knots, s: increasing, both ends of the record included.
-    Times(Vec<f64>),
-    /// About 40 intervals, and a penalty on the curvature whose weight the data choose.
-    Auto,
+/// The key of a basis beside its name.
+fn own_key(basis: BasisName) -> Option<&'static str> {
+    match basis {
+        BasisName::Nodal | BasisName::Constant => None,
+        BasisName::Polynomial => Some("degree"),
+        BasisName::PiecewiseConstant | BasisName::PiecewiseLinear | BasisName::BSpline => {
+            Some("knots")
+        }
+    }
 }
 
-/// Basis of a coefficient function, independent of the grid.
-#[derive(Debug, Clone, PartialEq)]
-pub enum BasisSpec {
-    /// One value per node.
-    Nodal,
-    /// One value for all times.
-    Constant,
-    /// One value per cell between knots.
-    PiecewiseConstant(Knots),
-    /// One value per knot, linear in between.
-    PiecewiseLinear(Knots),
-    /// A cubic spline.
-    BSpline(Knots),
-    /// A polynomial over the whole record.
-    Polynomial {
-        /// Degree.
-        degree: usize,
-    },
-}
+impl CoefficientSpec {
+    /// Refuses `knots` and `degree` where the basis does not use them.
+    pub(super) fn check_basis_keys(&self, key: &str) -> Result<(), BuildError> {
+        let given = [
+            ("knots", self.knots.is_some()),
+            ("degree", self.degree.is_some()),
+        ];
+        let own = self.basis.and_then(own_key);
+        let Some((unused, _)) = given.iter().find(|(k, given)| *given && own != Some(*k)) else {
+            return Ok(());
+        };
+        let problem = match self.basis {
+            Some(basis) => format!("the basis `{basis}` does not use this key"),
+            None => "this key needs a basis that uses it".to_owned(),
+        };
+        Err(BuildError::new(format!("{key}.{unused}"), problem)
+            .found(format!("`{unused}`"))
+            .expected(match (self.basis, own) {
+                (_, Some(own)) => format!("`{own}`"),
+                (Some(_), None) => "neither `knots` nor `degree`".to_owned(),
+                (None, None) => "`basis` beside it".to_owned(),
+            })
+            .hint(match *unused {
+                "knots" => "piecewise-constant, piecewise-linear and b-spline have knots",
+                _ => "polynomial has a degree",
+            }))
+    }
 
-impl BasisSpec {
     /// Constructs the basis on a grid; errors name keys below `key`.
-    pub(super) fn on(&self, key: &str, grid: &Grid) -> Result<Basis, BuildError> {
+    pub(super) fn basis_on(
+        &self,
+        name: BasisName,
+        key: &str,
+        grid: &Grid,
+    ) -> Result<Basis, BuildError> {
         let nodes = grid.nodes();
-        let at = |given: &Knots, most: usize| given.on(&format!("{key}.knots"), grid, most);
-        let basis = match self {
-            BasisSpec::Nodal => Basis::Nodal,
-            BasisSpec::Constant => Basis::Constant,
-            BasisSpec::PiecewiseConstant(knots) => {
-                let knots = at(knots, nodes + 1)?;
-                Basis::PiecewiseConstant { knots }
-            }
-            BasisSpec::PiecewiseLinear(knots) => {
-                let knots = at(knots, nodes)?;
-                Basis::PiecewiseLinear { knots }
-            }
-            BasisSpec::BSpline(knots) => {
-                let knots = at(knots, nodes.saturating_sub(2))?;
-                Basis::BSpline { knots }
-            }
-            BasisSpec::Polynomial { degree } => {
-                let (degree, most) = (*degree, Basis::highest_degree(grid));
+        let missing = |what: &str, expected: &str| {
+            BuildError::new(key, format!("the basis `{name}` needs {what}")).expected(expected)
+        };
+        let knots = |most: usize| match &self.knots {
+            Some(knots) => knots_on(knots, &format!("{key}.knots"), grid, most),
+            None => Err(missing(
+                "knots",
+                "`knots`: `auto`, the number of equally spaced knots, or a list of times in s",
+            )),
+        };
+        let basis = match name {
+            BasisName::Nodal => Basis::Nodal,
+            BasisName::Constant => Basis::Constant,
+            BasisName::PiecewiseConstant => Basis::PiecewiseConstant {
+                knots: knots(nodes + 1)?,
+            },
+            BasisName::PiecewiseLinear => Basis::PiecewiseLinear {
+                knots: knots(nodes)?,
+            },
+            BasisName::BSpline => Basis::BSpline {
+                knots: knots(nodes.saturating_sub(2))?,
+            },
+            BasisName::Polynomial => {
+                let degree = self.degree.ok_or_else(|| {
+                    missing("a degree", "`degree`: an integer, for instance `degree: 1`")
+                })?;
+                let most = Basis::highest_degree(grid);
                 if degree > most {
                     let problem = "the degree is too high for the grid";
                     return Err(BuildError::new(format!("{key}.degree"), problem)
@@ -76,29 +98,27 @@ impl BasisSpec {
     }
 }
 
-impl Knots {
-    /// Times of the knots, s; the first and last are exactly the ends of the record.
-    fn on(&self, key: &str, grid: &Grid, most: usize) -> Result<Vec<f64>, BuildError> {
-        let count = match self {
-            Knots::Count(count) => *count,
-            Knots::Times(times) => times.len(),
-            // Replaced by a number before.
-            Knots::Auto => 0,
-        };
-        if count < 2 {
-            return Err(BuildError::new(key, "there are fewer than two knots")
-                .found(count)
-                .expected("2 or more, both ends of the record included"));
-        }
-        if count > most {
-            return Err(BuildError::new(key, "there are more parameters than nodes")
-                .found(format!("{count} knots on {} nodes", grid.nodes()))
-                .expected(format!("at most {most} knots")));
-        }
-        match self {
-            Knots::Times(times) => listed(key, times, grid),
-            Knots::Count(_) | Knots::Auto => Ok(uniform_knots(grid, count)),
-        }
+/// Times of the knots, s; the first and last are exactly the ends of the record.
+fn knots_on(knots: &KnotSpec, key: &str, grid: &Grid, most: usize) -> Result<Vec<f64>, BuildError> {
+    let count = match knots {
+        KnotSpec::Count(count) => *count,
+        KnotSpec::Times(times) => times.len(),
+        // Replaced by a number before.
+        KnotSpec::Auto(_) => 0,
+    };
+    if count < 2 {
+        return Err(BuildError::new(key, "there are fewer than two knots")
+            .found(count)
+            .expected("2 or more, both ends of the record included"));
+    }
+    if count > most {
+        return Err(BuildError::new(key, "there are more parameters than nodes")
+            .found(format!("{count} knots on {} nodes", grid.nodes()))
+            .expected(format!("at most {most} knots")));
+    }
+    match knots {
+        KnotSpec::Times(times) => listed(key, times, grid),
+        KnotSpec::Count(_) | KnotSpec::Auto(_) => Ok(uniform_knots(grid, count)),
     }
 }
 

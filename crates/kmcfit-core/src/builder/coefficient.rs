@@ -1,272 +1,110 @@
-//! Specification of one coefficient function: basis, start, bounds and penalties.
+//! A coefficient function on a grid: what its keys state together.
 
 use super::BuildError;
-use super::basis::{BasisSpec, Knots};
 use crate::constraints::TimeHistory;
 use crate::functions::basis::from_physical_powers;
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Prior, WeightRule};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Prior};
+use crate::model::{
+    BasisName, Bound, CoefficientSpec, KnotSpec, KnownValue, KnownValueMap, NumberOrColumn,
+    StartSpec,
+};
 use crate::number_format::significant;
 use crate::system::Grid;
 
 /// Last key of a known part.
 pub(super) const KNOWN_PART: &str = "known_part";
+/// Key of a mass that may be `unknown`.
+pub const UNKNOWN_MASS: &str = "functions.mass.fixed";
 
-/// Start of a coefficient function, in its unit.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Start {
-    /// Equal at all times.
-    Constant(f64),
-    /// One value per parameter: per node, cell or knot; for a polynomial the coefficients of `t^0, t^1, …` (t in s).
-    Parameters(Vec<f64>),
-    /// Nodal values, projected onto the basis.
-    Nodal(Vec<f64>),
-}
-
-/// Weight of a penalty in J.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PenaltyWeight {
-    /// Fixed weight.
-    Given(f64),
-    /// Chosen by a rule.
-    Rule(WeightRule),
-    /// Weight whose smoothing time is one dominant period (equation error only).
-    Period,
-}
-
-/// Penalty on a coefficient function p, added to J.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Roughness {
-    /// `weight * integral (d^order (p - reference)/dt^order)^2 dt`.
-    Tikhonov {
-        /// Order of the derivative: 0, 1 or 2.
-        order: usize,
-        /// Weight.
-        weight: PenaltyWeight,
-        /// Reference values of a penalty of order 0, zero by default; other orders have none.
-        reference: Option<TimeHistory>,
-    },
-    /// `weight * total variation of p`: equal for jumps and slow changes of the same height.
-    TotalVariation {
-        /// Weight: a number, or the rule [`WeightRule::Bic`].
-        weight: PenaltyWeight,
-    },
-}
-
-/// Fixed values, a known constant with a standard deviation, a basis with a start, or for a record the shared function.
-#[derive(Debug, Clone, PartialEq)]
-enum CoefficientForm {
+/// Fixed values, a known constant with a standard deviation, a start in a basis, or for a record the shared function.
+enum Form<'a> {
     Fixed(TimeHistory),
     Uncertain(Prior),
-    Estimated(BasisSpec, Start),
+    Estimated(BasisName, &'a StartSpec),
     Shared,
 }
 
-/// A coefficient function: mass (kg), damping (N s/m), stiffness (N/m) or the factor of a further term; fixed, or estimated in
-/// a basis. It corresponds to an entry of `functions` in a model file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CoefficientSpec {
-    form: CoefficientForm,
-    pub(super) min: Option<TimeHistory>,
-    pub(super) max: Option<TimeHistory>,
-    /// Lower bound as a share of the smallest start value.
-    min_of_start: Option<f64>,
-    pub(super) penalties: Vec<Roughness>,
-    pub(super) width: Option<f64>,
-    /// Known part that is added.
-    pub(super) known_part: Option<Box<CoefficientSpec>>,
-}
-
 impl CoefficientSpec {
-    fn new(form: CoefficientForm) -> Self {
-        Self {
-            form,
-            min: None,
-            max: None,
-            min_of_start: None,
-            penalties: Vec::new(),
-            width: None,
-            known_part: None,
-        }
-    }
-
-    /// Fixed values.
-    pub fn known(values: TimeHistory) -> Self {
-        Self::new(CoefficientForm::Fixed(values))
-    }
-
-    /// Fixed and constant.
-    pub fn fixed(value: f64) -> Self {
-        Self::known(TimeHistory::Constant(value))
-    }
-
-    /// Constant, known as `value` with the standard deviation `sigma`: a parameter whose prior adds `((x - value)/sigma)^2` to J, so
-    /// that every interval includes it. It requires a sigma in every record.
-    pub fn uncertain(value: f64, sigma: f64) -> Self {
-        Self::new(CoefficientForm::Uncertain(Prior { mean: value, sigma }))
-    }
-
-    /// For a record ([`Record::coefficient`](super::Record::coefficient)): the shared function, with the known part of this record.
-    pub fn shared() -> Self {
-        Self::new(CoefficientForm::Shared)
-    }
-
-    /// Adds a known part, [`CoefficientSpec::known`] or [`CoefficientSpec::uncertain`], to the function. Start, bounds and penalties
-    /// concern the function without it.
-    #[must_use]
-    pub fn known_part(mut self, part: CoefficientSpec) -> Self {
-        self.known_part = Some(Box::new(part));
-        self
-    }
-
-    /// Estimated in a basis.
-    pub fn estimated(basis: BasisSpec, start: Start) -> Self {
-        Self::new(CoefficientForm::Estimated(basis, start))
-    }
-
-    /// Estimated, constant in time.
-    pub fn constant(start: f64) -> Self {
-        Self::estimated(BasisSpec::Constant, Start::Constant(start))
-    }
-
-    /// Estimated at every node, as in the paper.
-    pub fn nodal(start: f64) -> Self {
-        Self::estimated(BasisSpec::Nodal, Start::Constant(start))
-    }
-
-    /// Constant between equally spaced `knots`, both ends of the record included.
-    pub fn piecewise_constant(knots: usize, start: f64) -> Self {
-        let basis = BasisSpec::PiecewiseConstant(Knots::Count(knots));
-        Self::estimated(basis, Start::Constant(start))
-    }
-
-    /// Linear between equally spaced `knots`, both ends of the record included.
-    pub fn piecewise_linear(knots: usize, start: f64) -> Self {
-        let basis = BasisSpec::PiecewiseLinear(Knots::Count(knots));
-        Self::estimated(basis, Start::Constant(start))
-    }
-
-    /// A cubic spline with equally spaced `knots`, both ends of the record included.
-    pub fn b_spline(knots: usize, start: f64) -> Self {
-        Self::estimated(
-            BasisSpec::BSpline(Knots::Count(knots)),
-            Start::Constant(start),
-        )
-    }
-
-    /// A polynomial with start coefficients of `t^0, t^1, …` (t in s): one number for a constant, two for a line.
-    pub fn polynomial(start: &[f64]) -> Self {
-        let degree = start.len().saturating_sub(1);
-        Self::estimated(
-            BasisSpec::Polynomial { degree },
-            Start::Parameters(start.to_vec()),
-        )
-    }
-
-    /// Lower bound, in the unit of the function.
-    #[must_use]
-    pub fn min(self, min: f64) -> Self {
-        self.bounds(Some(TimeHistory::Constant(min)), None)
-    }
-
-    /// Upper bound, in the unit of the function.
-    #[must_use]
-    pub fn max(self, max: f64) -> Self {
-        self.bounds(None, Some(TimeHistory::Constant(max)))
-    }
-
-    /// Lower bound of `share` times the smallest start value, where no other lower bound is given and the upper one is above it.
-    #[must_use]
-    pub fn min_of_start(mut self, share: f64) -> Self {
-        self.min_of_start = Some(share);
-        self
-    }
-
     /// Lower bound, given or by the nodal values of the start.
     pub(super) fn lower_bound(&self, start: &[f64]) -> Option<TimeHistory> {
         let by_start = || {
             let least = start.iter().copied().fold(f64::INFINITY, f64::min);
             let bound = self.min_of_start? * least;
-            let is_below = self.max.as_ref().is_none_or(|max| bound < max.least());
+            let upper = limit(self.max.as_ref());
+            let is_below = upper.is_none_or(|max| bound < max.least());
             (self.is_estimated() && is_below).then_some(TimeHistory::Constant(bound))
         };
-        self.min.clone().or_else(by_start)
-    }
-
-    /// Bounds that may vary in time; `None` keeps the present one.
-    #[must_use]
-    pub fn bounds(mut self, min: Option<TimeHistory>, max: Option<TimeHistory>) -> Self {
-        self.min = min.or(self.min);
-        self.max = max.or(self.max);
-        self
-    }
-
-    /// Tikhonov penalty `weight * integral (d^order p/dt^order)^2 dt`, `order` 0, 1 or 2.
-    #[must_use]
-    pub fn tikhonov(self, order: usize, weight: f64) -> Self {
-        self.penalty(Roughness::Tikhonov {
-            order,
-            weight: PenaltyWeight::Given(weight),
-            reference: None,
-        })
-    }
-
-    /// Penalty `weight * total variation`, equal for jumps and slow changes of the same height.
-    #[must_use]
-    pub fn total_variation(self, weight: f64) -> Self {
-        let weight = PenaltyWeight::Given(weight);
-        self.penalty(Roughness::TotalVariation { weight })
-    }
-
-    /// Adds a penalty.
-    #[must_use]
-    pub fn penalty(mut self, penalty: Roughness) -> Self {
-        self.penalties.push(penalty);
-        self
-    }
-
-    /// Width of the law, for laws that have one: the smoothing speed (m/s) of Coulomb friction.
-    #[must_use]
-    pub fn width(mut self, width: f64) -> Self {
-        self.width = Some(width);
-        self
-    }
-
-    /// Basis of an estimated function.
-    pub(super) fn basis(&self) -> Option<&BasisSpec> {
-        match &self.form {
-            CoefficientForm::Estimated(basis, _) => Some(basis),
-            _ => None,
+        match self.min {
+            None => by_start(),
+            Some(_) => limit(self.min.as_ref()),
         }
     }
 
-    /// Sets the number of knots of a basis that has them.
-    pub(super) fn set_knots(&mut self, count: usize) {
-        if let CoefficientForm::Estimated(
-            BasisSpec::PiecewiseConstant(knots)
-            | BasisSpec::PiecewiseLinear(knots)
-            | BasisSpec::BSpline(knots),
-            _,
-        ) = &mut self.form
-        {
-            *knots = Knots::Count(count);
-        }
+    /// Upper bound.
+    pub(super) fn upper_bound(&self) -> Option<TimeHistory> {
+        limit(self.max.as_ref())
     }
 
     /// True if the function is estimated.
     pub(super) fn is_estimated(&self) -> bool {
-        matches!(self.form, CoefficientForm::Estimated(..))
+        self.fixed.is_none() && self.basis.is_some()
     }
 
     /// True for the shared function, with a known part of a record.
     pub(super) fn is_shared(&self) -> bool {
-        self.form == CoefficientForm::Shared
+        let has_other = self.min.is_some()
+            || self.max.is_some()
+            || self.penalty.is_some()
+            || self.width.is_some()
+            || self.start.is_some()
+            || self.basis.is_some()
+            || self.fixed.is_some();
+        self.known_part.is_some() && !has_other
+    }
+
+    /// True for automatic knots.
+    pub(super) fn has_automatic_knots(&self) -> bool {
+        matches!(self.knots, Some(KnotSpec::Auto(_)))
     }
 
     /// Known constant with a standard deviation, if it is one.
     pub(super) fn prior(&self) -> Option<Prior> {
-        match self.form {
-            CoefficientForm::Uncertain(prior) => Some(prior),
+        match &self.fixed {
+            Some(KnownValue::Map(map)) => Some(Prior {
+                mean: map.value?,
+                sigma: map.sigma?,
+            }),
             _ => None,
+        }
+    }
+
+    /// The form that the keys `fixed`, `start` and `basis` state together.
+    fn form(&self, key: &str) -> Result<Form<'_>, BuildError> {
+        let is_own = key.starts_with("experiments");
+        let error = |part: &str, problem: &str| BuildError::new(format!("{key}.{part}"), problem);
+        match (&self.fixed, &self.start, self.basis) {
+            (Some(_), Some(_), _) => Err(error("start", "`fixed` and `start` exclude each other")
+                .expected("either `fixed` or `start`")),
+            (Some(_), None, Some(_)) => {
+                Err(error("basis", "`fixed` and `basis` exclude each other")
+                    .expected("either `fixed`, or `basis` with `start`"))
+            }
+            (Some(fixed), None, None) => known(fixed, &fixed_key(key)),
+            (None, None, None) if is_own && self.is_shared() => Ok(Form::Shared),
+            (None, None, _) => Err(BuildError::new(
+                key,
+                "this function has neither a start nor a fixed value",
+            )
+            .expected("`start` for a function to be fitted, `fixed` for a known one")
+            .hint("mass, damping and stiffness of a fit start from the record")),
+            (None, Some(_), None) => {
+                let names: Vec<&str> = BasisName::ALL.iter().map(|basis| basis.name()).collect();
+                Err(
+                    BuildError::new(key, "a function to be fitted needs a basis")
+                        .expected(format!("`basis`, one of {}", names.join(", "))),
+                )
+            }
+            (None, Some(start), Some(basis)) => Ok(Form::Estimated(basis, start)),
         }
     }
 
@@ -277,28 +115,27 @@ impl CoefficientSpec {
         key: &str,
         grid: &Grid,
     ) -> Result<CoefficientFunction, BuildError> {
+        self.check_basis_keys(key)?;
+        let form = self.form(key)?;
         self.check(kind, key, grid)?;
         let nodes = grid.nodes();
-        let (key, function) = match &self.form {
-            CoefficientForm::Fixed(values) => {
+        let (key, function) = match form {
+            Form::Fixed(values) => {
                 let key = fixed_key(key);
-                let values = values_at_nodes(values, &key, nodes)?;
+                let values = values_at_nodes(&values, &key, nodes)?;
                 (key, CoefficientFunction::fixed(kind, values))
             }
-            CoefficientForm::Uncertain(prior) => {
+            Form::Uncertain(prior) => {
                 let key = fixed_key(key);
-                check_prior(&key, prior)?;
-                (key, CoefficientFunction::uncertain(kind, *prior, nodes))
+                check_prior(&key, &prior)?;
+                (key, CoefficientFunction::uncertain(kind, prior, nodes))
             }
-            CoefficientForm::Shared => {
-                return Err(BuildError::new(
-                    key,
-                    "this function has neither a start nor a fixed value",
-                )
-                .expected("`start` for a function to be fitted, `fixed` for a known one"));
+            // Without functions of its own it has no entry.
+            Form::Shared => {
+                return Err(BuildError::new(key, "this function has only a known part"));
             }
-            CoefficientForm::Estimated(basis, start) => {
-                let basis = basis.on(key, grid)?;
+            Form::Estimated(name, start) => {
+                let basis = self.basis_on(name, key, grid)?;
                 let key = format!("{key}.start");
                 let start = parameters(&key, &basis, start, grid)?;
                 let function = CoefficientFunction::free(kind, basis, grid, start);
@@ -313,10 +150,11 @@ impl CoefficientSpec {
 
     /// Error for invalid bounds or penalties, and for either on a fixed function.
     fn check(&self, kind: CoefficientKind, key: &str, grid: &Grid) -> Result<(), BuildError> {
+        let (min, max) = (limit(self.min.as_ref()), limit(self.max.as_ref()));
         let given = [
-            ("min", self.min.is_some()),
-            ("max", self.max.is_some()),
-            ("penalty", !self.penalties.is_empty()),
+            ("min", min.is_some()),
+            ("max", max.is_some()),
+            ("penalty", !self.penalties().is_empty()),
         ];
         if let Some((name, _)) = given.iter().find(|(_, given)| *given)
             && !self.is_estimated()
@@ -326,20 +164,90 @@ impl CoefficientSpec {
                 .found(format!("`fixed` and `{name}`"))
                 .expected("one of the two"));
         }
-        let bound = |name: &str, bound: &Option<TimeHistory>| match bound {
-            Some(values) => {
-                values_at_nodes(values, &format!("{key}.{name}"), grid.nodes()).map(drop)
+        for (name, given) in [("min", &self.min), ("max", &self.max)] {
+            if let Some(Bound::At(given)) = given {
+                let key = format!("{key}.{name}");
+                values_at_nodes(&history(given, &key)?, &key, grid.nodes())?;
             }
-            None => Ok(()),
-        };
-        bound("min", &self.min)?;
-        bound("max", &self.max)?;
-        uncrossed(key, kind.unit(), self.min.as_ref(), self.max.as_ref(), grid)?;
-        for (i, penalty) in self.penalties.iter().enumerate() {
-            penalty.check(&format!("{key}.penalty[{i}]"), grid)?;
+        }
+        uncrossed(key, kind.unit(), min.as_ref(), max.as_ref(), grid)?;
+        for (suffix, penalty) in self.penalty.iter().flat_map(|list| list.iter()) {
+            penalty.check(&format!("{key}.penalty{suffix}"), grid)?;
         }
         Ok(())
     }
+}
+
+/// A limit, where one is given.
+pub(super) fn limit(bound: Option<&Bound>) -> Option<TimeHistory> {
+    match bound {
+        Some(Bound::At(NumberOrColumn::Number(value))) => Some(TimeHistory::Constant(*value)),
+        Some(Bound::At(NumberOrColumn::History(values))) => Some(values.clone()),
+        _ => None,
+    }
+}
+
+/// Known values at `key`.
+fn known<'a>(given: &KnownValue, key: &str) -> Result<Form<'a>, BuildError> {
+    let map = match given {
+        KnownValue::Number(value) => return Ok(Form::Fixed(TimeHistory::Constant(*value))),
+        KnownValue::History(values) => return Ok(Form::Fixed(values.clone())),
+        KnownValue::Unknown(_) if key == UNKNOWN_MASS => {
+            return Ok(Form::Fixed(TimeHistory::Constant(1.0)));
+        }
+        KnownValue::Unknown(_) => {
+            return Err(BuildError::new(key, "only the mass can be unknown")
+                .found("`unknown`")
+                .expected("a value, or `basis` for a function to be fitted")
+                .hint("all coefficients are ratios to an unknown mass: `functions: {mass: {fixed: unknown}}`"));
+        }
+        KnownValue::Map(map) => map,
+    };
+    let KnownValueMap {
+        value,
+        sigma,
+        data,
+        column,
+    } = map;
+    match (value, sigma, data, column) {
+        (Some(mean), Some(sigma), None, None) => Ok(Form::Uncertain(Prior {
+            mean: *mean,
+            sigma: *sigma,
+        })),
+        (None, None, Some(_), Some(_)) => Err(unread(key)),
+        _ => {
+            let keys = [
+                ("value", value.is_some()),
+                ("sigma", sigma.is_some()),
+                ("data", data.is_some()),
+                ("column", column.is_some()),
+            ];
+            let given = keys.iter().filter(|(_, is_given)| *is_given);
+            let given: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
+            let problem = "neither a value with its standard deviation nor a column of a file";
+            Err(BuildError::new(key, problem)
+                .found(match given.is_empty() {
+                    true => "an empty map".to_owned(),
+                    false => given.join(" and "),
+                })
+                .expected("{value: 4.5, sigma: 0.02}, or {data: file.csv, column: name}"))
+        }
+    }
+}
+
+/// Values over time.
+pub(super) fn history(given: &NumberOrColumn, key: &str) -> Result<TimeHistory, BuildError> {
+    match given {
+        NumberOrColumn::Number(value) => Ok(TimeHistory::Constant(*value)),
+        NumberOrColumn::History(values) => Ok(values.clone()),
+        NumberOrColumn::Column(_) => Err(unread(key)),
+    }
+}
+
+/// Error for a column of a file, which is read before.
+fn unread(key: &str) -> BuildError {
+    BuildError::new(key, "the column of this file has not been read")
+        .expected("numbers, or values at the nodes")
 }
 
 /// Key of the fixed values of a function: `known_part` has them itself.
@@ -443,13 +351,20 @@ fn check_values(kind: CoefficientKind, key: &str, values: &[f64]) -> Result<(), 
 fn parameters(
     key: &str,
     basis: &Basis,
-    start: &Start,
+    start: &StartSpec,
     grid: &Grid,
 ) -> Result<Vec<f64>, BuildError> {
     match start {
-        Start::Constant(value) => Ok(basis.constant(grid, *value)),
-        Start::Parameters(values) => listed(key, basis, values, grid),
-        Start::Nodal(values) => basis.project(grid, values).ok_or_else(|| {
+        StartSpec::Number(value) => Ok(basis.constant(grid, *value)),
+        StartSpec::List(_) if matches!(basis, Basis::BSpline { .. }) => Err(BuildError::new(
+            key,
+            "`start` of the basis `b-spline` must be one number",
+        )
+        .found("a list")
+        .expected("a finite number, or a column: {data: file.csv, column: name}")),
+        StartSpec::List(values) => listed(key, basis, values, grid),
+        StartSpec::Column(_) => Err(unread(key)),
+        StartSpec::Nodal(values) => basis.project(grid, values).ok_or_else(|| {
             BuildError::new(key, "the column cannot be projected onto this basis")
                 .found(format!("`{}`", basis.name()))
                 .expected("a basis whose functions are linearly independent at the nodes")

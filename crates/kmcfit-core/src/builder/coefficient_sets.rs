@@ -1,16 +1,18 @@
 //! Coefficient sets of a builder: the functions shared by all records, and those of single records.
 
 use super::coefficient::KNOWN_PART;
-use super::{BuildError, Builder, CoefficientSpec};
+use super::{BuildError, Builder};
 use crate::functions::{CoefficientKind, CoefficientSet};
+use crate::model::{CoefficientSpec, KnownValue};
 use crate::solvers::Solver;
+use std::borrow::Cow;
 
 /// A coefficient function of a builder, with its key.
 pub(super) struct FunctionEntry<'a> {
     /// Key, such as `functions.mass` or `experiments[1].functions.damping`.
     pub key: String,
     pub kind: CoefficientKind,
-    pub spec: &'a CoefficientSpec,
+    pub spec: Cow<'a, CoefficientSpec>,
     /// Index of the record with its own function; `None` for a shared one.
     pub owner: Option<usize>,
     /// True for a known part.
@@ -52,9 +54,13 @@ impl Builder {
     pub(super) fn entries(&self) -> Vec<FunctionEntry<'_>> {
         let given = self.given();
         let known = (given.iter()).filter_map(|entry| {
+            let fixed = entry.spec.known_part.clone()?;
             Some(FunctionEntry {
                 key: format!("{}.{KNOWN_PART}", entry.key),
-                spec: entry.spec.known_part.as_deref()?,
+                spec: Cow::Owned(CoefficientSpec {
+                    fixed: Some(fixed),
+                    ..CoefficientSpec::default()
+                }),
                 is_known_part: true,
                 ..*entry
             })
@@ -70,7 +76,7 @@ impl Builder {
         let shared = (self.coefficients.iter()).map(|(kind, spec)| FunctionEntry {
             key: format!("functions.{}", kind.name()),
             kind: *kind,
-            spec,
+            spec: Cow::Borrowed(spec),
             owner: None,
             is_known_part: false,
         });
@@ -81,7 +87,7 @@ impl Builder {
                 .map(move |(kind, spec)| FunctionEntry {
                     key: format!("experiments[{i}].functions.{}", kind.name()),
                     kind: *kind,
-                    spec,
+                    spec: Cow::Borrowed(spec),
                     owner: Some(i),
                     is_known_part: false,
                 })
@@ -93,6 +99,7 @@ impl Builder {
     pub(super) fn coefficient_sets(&self) -> Result<CoefficientSets, BuildError> {
         let (given, entries) = (self.given(), self.entries());
         self.check_known(&entries)?;
+        self.check_stiffness()?;
         let shared: Vec<usize> = (0..self.coefficients.len()).collect();
         let known_of = |owner: Option<usize>| {
             let known = entries.iter().enumerate();
@@ -145,7 +152,7 @@ impl Builder {
     fn check_known(&self, entries: &[FunctionEntry]) -> Result<(), BuildError> {
         for entry in self.given() {
             if entry.spec.known_part.is_some()
-                && entry.spec.basis().is_none()
+                && !entry.spec.is_estimated()
                 && !entry.spec.is_shared()
             {
                 let problem = "a fixed function has no known part";
@@ -173,6 +180,33 @@ impl Builder {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Error for a fixed negative stiffness without a stiffening term: every motion would grow without end.
+    fn check_stiffness(&self) -> Result<(), BuildError> {
+        let stiffening = [
+            CoefficientKind::CUBIC_STIFFNESS,
+            CoefficientKind::QUINTIC_STIFFNESS,
+        ];
+        let mut kinds = self.coefficients.iter().map(|(kind, _)| kind);
+        if kinds.any(|kind| stiffening.contains(kind)) {
+            return Ok(());
+        }
+        for entry in self.given() {
+            let value = match &entry.spec.fixed {
+                Some(KnownValue::Number(value)) => Some(*value),
+                Some(KnownValue::Map(map)) => map.value,
+                _ => None,
+            };
+            let of_stiffness = value.filter(|_| entry.kind == CoefficientKind::STIFFNESS);
+            if let Some(value) = of_stiffness.filter(|value| *value < 0.0) {
+                let problem = "a negative stiffness without a term that stiffens: every motion grows without end";
+                return Err(BuildError::new(format!("{}.fixed", entry.key), problem)
+                    .found(value)
+                    .expected("a positive stiffness, or `cubic_stiffness` beside it"));
+            }
+        }
+        Ok(())
     }
 
     /// Index of the shared function that a record replaces.

@@ -1,6 +1,6 @@
 //! Constraints of a builder: their rows, and the projection of the start.
 
-use super::coefficient::uncrossed;
+use super::coefficient::{limit, uncrossed};
 use super::coefficient_sets::FunctionEntry;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
 use crate::constraints::{Constraint, ConstraintError, Constraints, Shape, TOLERANCE, TimeHistory};
@@ -10,7 +10,7 @@ use crate::solvers::StartProjection;
 
 /// A constraint, or a soft constraint with a penalty.
 #[derive(Debug, Clone)]
-pub(super) struct ConstraintSpec {
+pub(super) struct StatedConstraint {
     /// Key.
     pub key: String,
     pub statement: Constraint,
@@ -32,10 +32,10 @@ pub(super) fn of_bounds(
     entry: &FunctionEntry,
     start: &[f64],
     coefficient_set: usize,
-) -> Vec<ConstraintSpec> {
+) -> Vec<StatedConstraint> {
     let (of, key) = (entry.kind, entry.key.as_str());
-    let (min, max) = (entry.spec.lower_bound(start), entry.spec.max.clone());
-    let constraint = |name: &str, min, max| ConstraintSpec {
+    let (min, max) = (entry.spec.lower_bound(start), entry.spec.upper_bound());
+    let constraint = |name: &str, min, max| StatedConstraint {
         key: format!("{key}.{name}"),
         statement: Constraint::Bounds { of, min, max },
         soft: None,
@@ -57,7 +57,7 @@ impl Builder {
     /// Adds the rows of a constraint to the problem.
     pub(super) fn add(
         &self,
-        constraint: &ConstraintSpec,
+        constraint: &StatedConstraint,
         problem: &mut Problem,
         keys: &mut Vec<RowKey>,
         notices: &mut Vec<BuildNotice>,
@@ -109,7 +109,11 @@ impl Builder {
     /// `s(t) (m, c, k)` have the same response for every positive `s(t)`. Passivity and monotonicity of mass or stiffness are not
     /// invariant under this change: unless `s(t)` is determined otherwise, a suitable `s(t)` satisfies them, and they carry no
     /// information on the system.
-    fn uninformative(&self, constraint: &ConstraintSpec, problem: &Problem) -> Option<BuildNotice> {
+    fn uninformative(
+        &self,
+        constraint: &StatedConstraint,
+        problem: &Problem,
+    ) -> Option<BuildNotice> {
         let what = match &constraint.statement {
             Constraint::Passive => "passivity",
             Constraint::Shape {
@@ -143,11 +147,10 @@ impl Builder {
             TimeHistory::Nodal { .. } => true,
         };
         let entries = self.entries();
-        let own = entries
-            .iter()
-            .map(|entry| (&entry.spec.min, &entry.spec.max));
+        let own = entries.iter();
+        let own = own.map(|entry| (limit(entry.spec.min.as_ref()), entry.spec.upper_bound()));
         let listed = self.constraints.iter().filter_map(|c| match &c.statement {
-            Constraint::Bounds { min, max, .. } => Some((min, max)),
+            Constraint::Bounds { min, max, .. } => Some((min.clone(), max.clone())),
             _ => None,
         });
         let all: Vec<_> = own.chain(listed).collect();
@@ -157,7 +160,7 @@ impl Builder {
     }
 }
 
-impl ConstraintSpec {
+impl StatedConstraint {
     /// Error for an invalid weight, and for a constraint that excludes a positive mass.
     fn check(&self) -> Result<(), BuildError> {
         if let Some(weight) = self.soft {

@@ -2,8 +2,9 @@
 //! to be estimated.
 
 use super::BuildError;
-use super::record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
+use super::record::{ChannelSpec, Record};
 use crate::functions::{ScalarParameter, ScalarValue};
+use crate::model::{DelayValue, EstimateSpec, ScalarSpec, SensorSpec};
 use crate::objective::state_scales;
 use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, integral_over};
 use crate::signal::{even_spacing, median_spacing};
@@ -49,7 +50,8 @@ impl PendingScalar<'_> {
     ) -> Result<ScalarValue, BuildError> {
         let (start, prior) = match spec {
             ScalarSpec::Known(number) => return Ok(ScalarValue::Known(number)),
-            ScalarSpec::Estimated { start, prior } => (start, prior),
+            ScalarSpec::Estimate(_) => (None, None),
+            ScalarSpec::Estimated(EstimateSpec { start, prior }) => (start, prior),
         };
         if let Some(prior) = prior.filter(|prior| prior.sigma <= 0.0 || !prior.sigma.is_finite()) {
             let key = format!("{}.prior.sigma", self.key);
@@ -310,6 +312,15 @@ impl ExperimentBuilder<'_> {
             delay,
             ..
         } = channel.sensor;
+        // Limits of a delay concern the samples that are used.
+        let delay = delay.map(|delay| match delay {
+            DelayValue::Known(delay) => ScalarSpec::Known(delay),
+            DelayValue::Estimate(word) => ScalarSpec::Estimate(word),
+            DelayValue::Estimated(spec) => ScalarSpec::Estimated(EstimateSpec {
+                start: spec.start,
+                prior: None,
+            }),
+        });
         let (kind, values) = (channel.kind.name(), &channel.values);
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;

@@ -5,7 +5,8 @@
 //! give the same problems and errors; the key of a [`BuildError`] is that of the model file.
 //!
 //! ```
-//! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record};
+//! use kmcfit_core::model::CoefficientSpec;
+//! use kmcfit_core::{Builder, CoefficientKind, Record};
 //!
 //! // A free decay of one second: m = 1 kg, c = 2 N s/m, k = 2500 N/m, so 8 Hz.
 //! let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
@@ -33,6 +34,7 @@ mod automatic_knots;
 mod basis;
 mod coefficient;
 mod coefficient_sets;
+mod constraint_entry;
 mod constraints;
 mod error;
 mod experiment;
@@ -44,21 +46,21 @@ mod penalties;
 mod record;
 mod variations;
 
-pub use basis::{BasisSpec, Knots};
-pub use coefficient::{CoefficientSpec, PenaltyWeight, Roughness, Start};
+pub use coefficient::UNKNOWN_MASS;
 pub use constraints::listed;
 pub use error::{BuildError, Contradiction};
 pub use notice::BuildNotice;
 pub use penalties::WeightSearch;
-pub use record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
+pub use record::{ChannelSpec, Record};
 
 use crate::constraints::Constraint;
 use crate::functions::{CoefficientKind, ScalarParameter};
+use crate::model::{CoefficientSpec, ConstraintSpec};
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::solvers::Solver;
 use crate::system::{Grid, Method, State};
-use constraints::{ConstraintSpec, RowKey, move_start};
+use constraints::{RowKey, StatedConstraint, move_start};
 
 /// Specification of a problem.
 #[derive(Debug, Clone)]
@@ -70,7 +72,7 @@ pub struct Builder {
     method: Method,
     solver: Solver,
     is_simulation: bool,
-    constraints: Vec<ConstraintSpec>,
+    constraints: Vec<StatedConstraint>,
     /// States at the first node, for initial states without a start; estimated from the samples where empty.
     states: Vec<State>,
 }
@@ -238,10 +240,30 @@ impl Builder {
         self.constraint(key, statement, Some(weight))
     }
 
+    /// Adds the constraints of a model file.
+    ///
+    /// # Errors
+    /// The first invalid one.
+    pub fn constraints(mut self, list: &[ConstraintSpec], grid: &Grid) -> Result<Self, BuildError> {
+        if list.is_empty() {
+            return Err(BuildError::new("constraints", "there is no constraint")
+                .found("an empty list")
+                .expected("at least one constraint, or no `constraints`"));
+        }
+        for (i, spec) in list.iter().enumerate() {
+            for (key, constraint) in
+                constraint_entry::read(&format!("constraints[{i}]"), grid, spec)?
+            {
+                self = self.constraint(key, constraint, spec.soft);
+            }
+        }
+        Ok(self)
+    }
+
     /// Adds a constraint with the key `key` of a model file; soft with a weight.
     #[must_use]
-    pub fn constraint(mut self, key: String, statement: Constraint, soft: Option<f64>) -> Self {
-        self.constraints.push(ConstraintSpec {
+    fn constraint(mut self, key: String, statement: Constraint, soft: Option<f64>) -> Self {
+        self.constraints.push(StatedConstraint {
             key,
             statement,
             soft,

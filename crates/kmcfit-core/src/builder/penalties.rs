@@ -1,9 +1,10 @@
 //! Penalties of a builder: Tikhonov penalties of its functions.
 
-use super::coefficient::{PenaltyWeight, Roughness, values_at_nodes};
+use super::coefficient::{history, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::TimeHistory;
 use crate::functions::{Basis, Penalty, WeightRule};
+use crate::model::{PenaltyKind, PenaltySpec, WeightChoice};
 use crate::problem::Problem;
 use crate::record::Weighting;
 use crate::solvers::Measurements;
@@ -34,29 +35,24 @@ impl Builder {
             let Some(basis) = problem.functions.get(j).basis.clone() else {
                 continue;
             };
-            for (i, spec) in entry.spec.penalties.iter().enumerate() {
-                let key = format!("{}.penalty[{i}]", entry.key);
-                let (order, weight, reference) = match spec {
-                    Roughness::Tikhonov {
-                        order,
-                        weight,
-                        reference,
-                    } => (*order, *weight, reference.as_ref()),
-                    Roughness::TotalVariation { weight } => {
-                        let function = (j, &basis);
-                        search = self.add_variation(problem, function, &key, *weight, search)?;
-                        continue;
-                    }
-                };
-                let factor = match weight {
-                    PenaltyWeight::Given(weight) => weight,
-                    PenaltyWeight::Period => {
+            for (suffix, spec) in entry.spec.penalty.iter().flat_map(|list| list.iter()) {
+                let key = format!("{}.penalty{suffix}", entry.key);
+                if spec.kind == PenaltyKind::TotalVariation {
+                    let function = (j, &basis);
+                    search = self.add_variation(problem, function, &key, spec.weight, search)?;
+                    continue;
+                }
+                let order = spec.order.unwrap_or_default();
+                let (factor, rule) = match spec.weight {
+                    WeightChoice::Number(weight) => (weight, None),
+                    WeightChoice::Rule(WeightRule::Period) => {
                         self.check_period(&key, order)?;
-                        measured.map_or(0.0, |m| m.period_weight(problem, j, order))
+                        let weight = measured.map(|m| m.period_weight(problem, j, order));
+                        (weight.unwrap_or(0.0), None)
                     }
-                    PenaltyWeight::Rule(rule) => {
+                    WeightChoice::Rule(rule) => {
                         self.check_rule(&key, rule, search.as_ref())?;
-                        1.0
+                        (1.0, Some(rule))
                     }
                 };
                 let mut penalty = Penalty::new(
@@ -65,7 +61,8 @@ impl Builder {
                     factor,
                     basis.roughness(&problem.system.grid, order),
                 );
-                if let Some(reference) = reference {
+                if let Some(reference) = &spec.reference {
+                    let reference = &history(reference, &key)?;
                     let residuals = residuals_at(problem, &basis, &key, reference, &penalty)?;
                     penalty.rows.set_right(residuals);
                 }
@@ -74,12 +71,8 @@ impl Builder {
                     notices.push(BuildNotice::NoRoughness { key, basis });
                     continue;
                 }
-                if let PenaltyWeight::Rule(rule) = weight {
-                    penalty.rule = Some(rule);
-                }
-                if let PenaltyWeight::Rule(rule) = weight
-                    && rule != WeightRule::RestrictedLikelihood
-                {
+                penalty.rule = rule;
+                if let Some(rule) = rule.filter(|rule| *rule != WeightRule::RestrictedLikelihood) {
                     let search = search.get_or_insert_with(|| WeightSearch {
                         rule,
                         penalties: Vec::new(),
@@ -152,7 +145,7 @@ impl Builder {
                 "the rule `reml` needs a likelihood of the samples",
                 "`sigma` in every experiment, a number or `estimate`",
             ),
-            WeightRule::Bic => return Ok(()),
+            WeightRule::Bic | WeightRule::Period => return Ok(()),
         };
         match found {
             Some(i) => Err(BuildError::new(key, problem)
@@ -188,34 +181,49 @@ fn residuals_at(
     Ok(penalty.residuals(&nearest))
 }
 
-impl Roughness {
+impl PenaltySpec {
     pub(super) fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
-        let (order, weight, reference) = match self {
-            Self::TotalVariation { weight } => (1, *weight, &None),
-            Self::Tikhonov {
-                order,
-                weight,
-                reference,
-            } => (*order, *weight, reference),
+        let error = |part: &str, problem: &str| BuildError::new(format!("{key}.{part}"), problem);
+        let order = match (self.kind, self.order) {
+            (PenaltyKind::TotalVariation, _) => {
+                let others = [
+                    ("order", self.order.is_some()),
+                    ("reference", self.reference.is_some()),
+                ];
+                if let Some((other, _)) = others.iter().find(|(_, given)| *given) {
+                    let problem = "a penalty on total variation has only a weight";
+                    return Err(error(other, problem)
+                        .found(format!("`{other}` beside `kind: tv`"))
+                        .expected(format!("no `{other}`, or `kind: tikhonov`")));
+                }
+                1
+            }
+            (PenaltyKind::Tikhonov, Some(order)) => order,
+            (PenaltyKind::Tikhonov, None) => {
+                return Err(BuildError::new(key, "the key `order` is missing")
+                    .found("a penalty of the kind `tikhonov` alone")
+                    .expected("for instance `order: 2`"));
+            }
         };
         if order > HIGHEST_ORDER {
-            let problem = "this derivative cannot be penalised";
-            return Err(BuildError::new(format!("{key}.order"), problem)
+            return Err(error("order", "this derivative cannot be penalised")
                 .found(order)
                 .expected("0 (the value), 1 (the slope) or 2 (the curvature)"));
         }
-        if let PenaltyWeight::Given(weight) = weight {
+        if let WeightChoice::Number(weight) = self.weight {
             check_weight(&format!("{key}.weight"), weight)?;
         }
-        let at = format!("{key}.reference");
-        match reference {
-            Some(_) if order > 0 => Err(BuildError::new(
-                &at,
+        match &self.reference {
+            Some(_) if order > 0 => Err(error(
+                "reference",
                 "only a penalty of order 0 has a reference",
             )
             .found(format!("a reference with order {order}"))
             .expected("no `reference`, or `order: 0`")),
-            Some(reference) => values_at_nodes(reference, &at, grid.nodes()).map(drop),
+            Some(given) => {
+                let key = format!("{key}.reference");
+                values_at_nodes(&history(given, &key)?, &key, grid.nodes()).map(drop)
+            }
             None => Ok(()),
         }
     }

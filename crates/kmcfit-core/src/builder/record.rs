@@ -1,7 +1,8 @@
 //! Specification of one record: initial state, input and channels.
 
-use super::{BuildError, CoefficientSpec};
-use crate::functions::{CoefficientKind, Prior};
+use super::BuildError;
+use crate::functions::CoefficientKind;
+use crate::model::{CoefficientSpec, ScalarSpec, SensorSpec};
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
 use crate::number_format::significant;
 use crate::record::{
@@ -11,50 +12,6 @@ use crate::record::{
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 use crate::system::InputQuantity;
 use std::sync::Arc;
-
-/// A scalar that is known, or estimated together with the coefficient functions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ScalarSpec {
-    /// Known.
-    Known(f64),
-    /// Estimated.
-    Estimated {
-        /// Start; estimated from the samples if `None`.
-        start: Option<f64>,
-        /// Prior, which adds `((x - mean)/sigma)^2` to J.
-        prior: Option<Prior>,
-    },
-}
-
-impl ScalarSpec {
-    /// Estimated without a start or a prior.
-    pub const ESTIMATED: Self = Self::Estimated {
-        start: None,
-        prior: None,
-    };
-
-    /// True if the start is to be estimated from the samples.
-    pub(super) fn is_open(self) -> bool {
-        self == Self::ESTIMATED
-    }
-}
-
-/// Specification of a sensor: `sample = gain * response(t - delay) + offset + drift * time`; by default gain 1, the others 0.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SensorSpec {
-    /// Gain; 1 by default.
-    pub gain: Option<ScalarSpec>,
-    /// Sample at rest, in the SI unit of the channel.
-    pub offset: Option<ScalarSpec>,
-    /// Change of the offset, in the SI unit of the channel per s.
-    pub drift: Option<ScalarSpec>,
-    /// Delay of the samples relative to the recorded input or to the other channels, s; positive for late samples. The response must
-    /// cover the time of a sample less its delay: samples that it does not cover are compared with its first or last node.
-    pub delay: Option<ScalarSpec>,
-    /// True for a sensor of absolute motion, false for one of motion relative to the base; by default absolute for accelerometers,
-    /// relative for others.
-    pub absolute: Option<bool>,
-}
 
 /// Specification of one channel.
 #[derive(Debug, Clone, PartialEq)]

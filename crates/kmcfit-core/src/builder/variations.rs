@@ -1,9 +1,9 @@
 //! Total-variation penalties of a builder.
 
-use super::coefficient::{PenaltyWeight, Roughness};
 use super::penalties::WeightSearch;
 use super::{BuildError, Builder};
 use crate::functions::{Basis, TotalVariation, WeightRule};
+use crate::model::{PenaltyKind, WeightChoice};
 use crate::problem::Problem;
 
 impl Builder {
@@ -14,19 +14,18 @@ impl Builder {
         problem: &mut Problem,
         function: (usize, &Basis),
         key: &str,
-        weight: PenaltyWeight,
+        weight: WeightChoice,
         search: Option<WeightSearch>,
     ) -> Result<Option<WeightSearch>, BuildError> {
         let (weight, search) = match weight {
-            PenaltyWeight::Given(weight) => (weight, search),
-            PenaltyWeight::Rule(WeightRule::Bic) => {
+            WeightChoice::Number(weight) => (weight, search),
+            WeightChoice::Rule(WeightRule::Bic) => {
                 self.check_bic(function.1, key, search.as_ref())?;
                 let penalties = vec![problem.variations.len()];
                 let rule = WeightRule::Bic;
                 (1.0, Some(WeightSearch { rule, penalties }))
             }
-            PenaltyWeight::Rule(rule) => return Err(other_rule(key, rule.name())),
-            PenaltyWeight::Period => return Err(other_rule(key, "period")),
+            WeightChoice::Rule(rule) => return Err(other_rule(key, rule.name())),
         };
         if weight > 0.0 {
             let (function, basis) = function;
@@ -73,7 +72,7 @@ impl Builder {
             .rsplit_once(".penalty")
             .map_or(key, |(function, _)| function);
         let mut entries = self.entries().into_iter();
-        if entries.any(|entry| entry.key == own && entry.spec.penalties.len() > 1) {
+        if entries.any(|entry| entry.key == own && entry.spec.penalties().len() > 1) {
             let problem = "a function with the rule `bic` has no other penalty";
             return Err(BuildError::new(at, problem)
                 .found("several penalties of the function")
@@ -92,12 +91,10 @@ impl Builder {
     /// Name of another rule for a weight in the model, besides the first `bic`.
     fn other_rule(&self, search: Option<&WeightSearch>) -> Option<&'static str> {
         let entries = self.entries();
-        let penalties = entries.iter().flat_map(|entry| &entry.spec.penalties);
-        let mut rules = penalties.filter_map(|penalty| match penalty {
-            Roughness::Tikhonov {
-                weight: PenaltyWeight::Rule(rule),
-                ..
-            } => Some(rule.name()),
+        let penalties = entries.iter().flat_map(|entry| entry.spec.penalties());
+        let mut rules = penalties.filter_map(|penalty| match (penalty.kind, penalty.weight) {
+            (_, WeightChoice::Rule(WeightRule::Period)) => None,
+            (PenaltyKind::Tikhonov, WeightChoice::Rule(rule)) => Some(rule.name()),
             _ => None,
         });
         rules.next().or(search.map(|first| first.rule.name()))

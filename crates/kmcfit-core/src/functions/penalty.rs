@@ -3,13 +3,18 @@
 use crate::rows::Rows;
 
 /// Rule that chooses the weight of a penalty from the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum WeightRule {
-    /// The largest weight with chi-square at most `n + 2 sqrt(2 n)` (Morozov).
+    /// Discrepancy principle: the largest weight whose residuals agree with the noise, chi-square at most `n + 2 sqrt(2 n)`.
     Discrepancy,
-    /// Largest restricted likelihood of noise and weights, each penalty with its own weight (Wood 2011).
+    /// Restricted maximum likelihood of noise and smoothness; each penalty has its own weight (Wood 2011).
+    #[serde(rename = "reml")]
     RestrictedLikelihood,
-    /// Least Bayesian information criterion of a total-variation penalty, then a fit without it on the jumps found.
+    /// Weight at which the function resolves changes within one dominant period of the response.
+    Period,
+    /// For `tv`: Bayesian information criterion with the number of levels as degrees of freedom; then a fit without the
+    /// penalty on the jumps found.
     Bic,
 }
 
@@ -19,6 +24,7 @@ impl WeightRule {
         match self {
             Self::Discrepancy => "discrepancy",
             Self::RestrictedLikelihood => "reml",
+            Self::Period => "period",
             Self::Bic => "bic",
         }
     }

@@ -1,11 +1,15 @@
 //! Scalar parameters: initial states, gains and offsets of sensors, estimated together with the functions.
 
-/// Gaussian prior of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Gaussian prior of a nuisance parameter: it adds `((x - mean) / sigma)^2` to J.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "prior", extend("expecting" = "a map such as {mean: 1.0, sigma: 0.1}"))]
 pub struct Prior {
     /// Mean.
+    #[schemars(extend("example" = "1.0"))]
     pub mean: f64,
-    /// Standard deviation; the prior adds `((x - mean) / sigma)^2` to J.
+    /// Standard deviation.
+    #[schemars(extend("example" = "0.1", "range" = "greater than 0"))]
     pub sigma: f64,
 }
 

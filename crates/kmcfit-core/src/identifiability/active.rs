@@ -77,8 +77,9 @@ fn cone_row(cone: &Cone, theta: &[f64]) -> Option<Vec<(usize, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
     use crate::constraints::Constraint;
+    use crate::model::CoefficientSpec;
 
     fn problem(statement: Constraint) -> Problem {
         let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i)).collect();

@@ -59,7 +59,8 @@ impl Quantity {
 mod tests {
     use super::super::Bands;
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     /// The interval is that of the gradient by central differences of `k(T)/k(0) - 1` in the parameters.
     #[test]

@@ -188,7 +188,8 @@ fn hats(parameters: usize, count: usize) -> Vec<Vec<(usize, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     /// A problem with nodal functions coarsened to hats, a constant and an estimated initial state.
     fn coarse() -> (Problem, Directions) {

@@ -1,6 +1,6 @@
 //! Maps with one key for each coefficient of the table.
 
-use super::FunctionSpec;
+use super::CoefficientSpec;
 use crate::functions::CoefficientKind;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
@@ -130,7 +130,7 @@ impl JsonSchema for CoefficientKind {
 pub struct Shared;
 
 impl CoefficientMap for Shared {
-    type Item = FunctionSpec;
+    type Item = CoefficientSpec;
     const NAME: &'static str = "functions";
     const TEXT: &'static str =
         "Coefficient functions of the system; mass, damping and stiffness are required.";
@@ -145,7 +145,7 @@ impl CoefficientMap for Shared {
 pub struct Own;
 
 impl CoefficientMap for Own {
-    type Item = FunctionSpec;
+    type Item = CoefficientSpec;
     const NAME: &'static str = "own_functions";
     const TEXT: &'static str =
         "Coefficient functions of one experiment, in place of the shared ones.";

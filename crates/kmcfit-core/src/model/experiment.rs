@@ -1,9 +1,10 @@
 //! Keys of an experiment: data file, channels, sensors, input and initial state.
 
 use super::{
-    ByCoefficient, ColumnId, EstimateWord, InputSigmaSpec, NoisesSpec, NumberOrEstimate, OneOrList,
-    Own, RangeSpec, ScalarOr, SigmaValue, words,
+    ByCoefficient, ColumnId, EstimateWord, InputSigmaSpec, NoisesSpec, OneOrList, Own, RangeSpec,
+    ScalarOr, SigmaValue, words,
 };
+use crate::functions::Prior;
 use crate::signal::Interpolation;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -369,13 +370,13 @@ words! {
 pub struct SensorsSpec {
     /// Sensor of the displacement.
     #[schemars(extend("example" = "{drift: estimate}"))]
-    pub displacement: Option<SensorKeys>,
+    pub displacement: Option<SensorSpec>,
     /// Sensor of the velocity.
     #[schemars(extend("example" = "{gain: estimate}"))]
-    pub velocity: Option<SensorKeys>,
+    pub velocity: Option<SensorSpec>,
     /// Sensor of the acceleration.
     #[schemars(extend("example" = "{offset: estimate}"))]
-    pub acceleration: Option<SensorKeys>,
+    pub acceleration: Option<SensorSpec>,
     /// Sensor of the force.
     #[schemars(extend("example" = "{delay: estimate}", "needs" = "`columns.force`, no motion of the base"))]
     pub force: Option<InputSensorSpec>,
@@ -398,10 +399,30 @@ pub struct InputSensorSpec {
 }
 
 /// A delay: a number, `estimate`, or an estimate with limits.
-pub type DelayValue = ScalarOr<NumberOrEstimate, DelaySpec>;
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(inline)]
+pub enum DelayValue {
+    /// Known, s.
+    Known(f64),
+    /// Estimated, from 0.
+    Estimate(EstimateWord),
+    /// Estimated within limits.
+    Estimated(DelaySpec),
+}
+
+impl DelayValue {
+    /// Estimated from a start value, in s.
+    pub fn starting_at(start: f64) -> Self {
+        Self::Estimated(DelaySpec {
+            start: Some(start),
+            ..DelaySpec::default()
+        })
+    }
+}
 
 /// An estimated delay. Samples that a delay within the limits moves out of the record are left out.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "delay", extend("expecting" = "a map such as {start: 0.0, min: -0.01, max: 0.01}"))]
 pub struct DelaySpec {
@@ -420,16 +441,16 @@ pub struct DelaySpec {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "sensor", extend("expecting" = "a map such as {gain: 1.0, offset: estimate}"))]
-pub struct SensorKeys {
+pub struct SensorSpec {
     /// Gain.
     #[schemars(extend("example" = "1.0", "default" = "1", "range" = "not 0"))]
-    pub gain: Option<EstimateValue>,
+    pub gain: Option<ScalarSpec>,
     /// Offset.
     #[schemars(extend("example" = "estimate", "unit" = "SI unit of the channel", "default" = "0"))]
-    pub offset: Option<EstimateValue>,
+    pub offset: Option<ScalarSpec>,
     /// Drift: rate of change of the offset.
     #[schemars(extend("example" = "estimate", "unit" = "SI unit of the channel per s", "default" = "0"))]
-    pub drift: Option<EstimateValue>,
+    pub drift: Option<ScalarSpec>,
     /// Delay of the samples against the input or the other channels: positive where they are late.
     #[schemars(extend("example" = "estimate", "unit" = "s", "default" = "0", "needs" = "an input, or another channel"))]
     pub delay: Option<DelayValue>,
@@ -442,11 +463,43 @@ pub struct SensorKeys {
     pub absolute: Option<bool>,
 }
 
-/// A number, `estimate`, or an estimate with a start value or a prior.
-pub type EstimateValue = ScalarOr<NumberOrEstimate, EstimateSpec>;
+/// A scalar that is known, or estimated together with the functions: a number, `estimate`, or an estimate with a start value or a prior.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(inline)]
+pub enum ScalarSpec {
+    /// Known.
+    Known(f64),
+    /// Estimated, from a start that the samples give.
+    Estimate(EstimateWord),
+    /// Estimated, with a start value or a prior.
+    Estimated(EstimateSpec),
+}
+
+impl ScalarSpec {
+    /// Estimated without a start or a prior.
+    pub const ESTIMATED: Self = Self::Estimate(EstimateWord);
+
+    /// Estimated from a start value.
+    pub fn starting_at(start: f64) -> Self {
+        Self::Estimated(EstimateSpec {
+            start: Some(start),
+            prior: None,
+        })
+    }
+
+    /// True if the start is to be estimated from the samples.
+    pub fn is_open(self) -> bool {
+        match self {
+            Self::Known(_) => false,
+            Self::Estimate(_) => true,
+            Self::Estimated(spec) => spec == EstimateSpec::default(),
+        }
+    }
+}
 
 /// A nuisance parameter, estimated with the functions.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "estimate", extend("expecting" = "a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}"))]
 pub struct EstimateSpec {
@@ -455,20 +508,7 @@ pub struct EstimateSpec {
     pub start: Option<f64>,
     /// Gaussian prior, which adds ((x - mean)/sigma)^2 to J.
     #[schemars(extend("example" = "{mean: 1.0, sigma: 0.1}", "default" = "nothing"))]
-    pub prior: Option<PriorSpec>,
-}
-
-/// Gaussian prior of a nuisance parameter.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "prior", extend("expecting" = "a map such as {mean: 1.0, sigma: 0.1}"))]
-pub struct PriorSpec {
-    /// Mean.
-    #[schemars(extend("example" = "1.0"))]
-    pub mean: f64,
-    /// Standard deviation.
-    #[schemars(extend("example" = "0.1", "range" = "greater than 0"))]
-    pub sigma: f64,
+    pub prior: Option<Prior>,
 }
 
 /// Force on the mass: a column with its interpolation, or a waveform.
@@ -546,8 +586,8 @@ pub type InitialSpec = ScalarOr<EstimateWord, InitialStateSpec>;
 pub struct InitialStateSpec {
     /// Initial displacement.
     #[schemars(extend("example" = "3.3", "unit" = "m"))]
-    pub displacement: EstimateValue,
+    pub displacement: ScalarSpec,
     /// Initial velocity.
     #[schemars(extend("example" = "1.0", "unit" = "m/s"))]
-    pub velocity: EstimateValue,
+    pub velocity: ScalarSpec,
 }

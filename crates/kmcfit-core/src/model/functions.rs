@@ -1,16 +1,18 @@
 //! Keys of the coefficient functions.
 
 use super::{
-    Bound, KnotSpec, KnownValue, NumberOrColumn, OneOrList, StartSpec, WeightChoice, words,
+    Bound, KnotSpec, KnownValue, KnownValueMap, NumberOrColumn, OneOrList, StartSpec, WeightChoice,
+    words,
 };
+use crate::constraints::TimeHistory;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// A coefficient function: estimated, with a basis and start values, or fixed.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "function", extend("expecting" = "a map such as {basis: nodal, start: 2.0}"))]
-pub struct FunctionSpec {
+pub struct CoefficientSpec {
     /// Basis of an estimated function, which defines its parameters.
     #[schemars(extend("example" = "piecewise-linear", "needs" = "`start`"))]
     pub basis: Option<BasisName>,
@@ -76,7 +78,7 @@ pub struct FunctionSpec {
     pub max: Option<Bound>,
     /// Penalty on the roughness, added to J; or a list of penalties.
     #[schemars(extend("example" = "{kind: tikhonov, order: 2, weight: 0.1}", "default" = "none", "needs" = "`basis`"))]
-    pub penalty: Option<OneOrList<PenaltyKeys>>,
+    pub penalty: Option<OneOrList<PenaltySpec>>,
     /// Width of the law of the coefficient. Coulomb friction: velocity in m/s over which its sign is smoothed, well below the peak
     /// velocity of the response.
     #[schemars(extend(
@@ -85,6 +87,146 @@ pub struct FunctionSpec {
         "needs" = "a coefficient whose law has a width, which requires it"
     ))]
     pub width: Option<f64>,
+    /// Lower bound as a share of the smallest start value, where no other lower bound is given and the upper one is above it.
+    #[serde(skip)]
+    pub min_of_start: Option<f64>,
+}
+
+impl CoefficientSpec {
+    /// Fixed values.
+    pub fn known(values: TimeHistory) -> Self {
+        Self {
+            fixed: Some(KnownValue::History(values)),
+            ..Self::default()
+        }
+    }
+
+    /// Fixed and constant.
+    pub fn fixed(value: f64) -> Self {
+        Self::known(TimeHistory::Constant(value))
+    }
+
+    /// Constant, known as `value` with the standard deviation `sigma`: a parameter whose prior adds `((x - value)/sigma)^2` to J, so
+    /// that every interval includes it. It requires a sigma in every record.
+    pub fn uncertain(value: f64, sigma: f64) -> Self {
+        let fixed = KnownValueMap {
+            value: Some(value),
+            sigma: Some(sigma),
+            ..KnownValueMap::default()
+        };
+        Self {
+            fixed: Some(KnownValue::Map(fixed)),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a known part, [`CoefficientSpec::known`] or [`CoefficientSpec::uncertain`], to the function; without another key it is the
+    /// shared function with the known part of one record. Start, bounds and penalties concern the function without it.
+    #[must_use]
+    pub fn known_part(mut self, part: CoefficientSpec) -> Self {
+        self.known_part = part.fixed;
+        self
+    }
+
+    /// Estimated in a basis.
+    pub fn estimated(basis: BasisName, start: StartSpec) -> Self {
+        Self {
+            basis: Some(basis),
+            start: Some(start),
+            ..Self::default()
+        }
+    }
+
+    /// Estimated, constant in time.
+    pub fn constant(start: f64) -> Self {
+        Self::estimated(BasisName::Constant, StartSpec::Number(start))
+    }
+
+    /// Estimated at every node, as in the paper.
+    pub fn nodal(start: f64) -> Self {
+        Self::estimated(BasisName::Nodal, StartSpec::Number(start))
+    }
+
+    /// Constant between equally spaced `knots`, both ends of the record included.
+    pub fn piecewise_constant(knots: usize, start: f64) -> Self {
+        Self::estimated(BasisName::PiecewiseConstant, StartSpec::Number(start))
+            .knots(KnotSpec::Count(knots))
+    }
+
+    /// Linear between equally spaced `knots`, both ends of the record included.
+    pub fn piecewise_linear(knots: usize, start: f64) -> Self {
+        Self::estimated(BasisName::PiecewiseLinear, StartSpec::Number(start))
+            .knots(KnotSpec::Count(knots))
+    }
+
+    /// A cubic spline with equally spaced `knots`, both ends of the record included.
+    pub fn b_spline(knots: usize, start: f64) -> Self {
+        Self::estimated(BasisName::BSpline, StartSpec::Number(start)).knots(KnotSpec::Count(knots))
+    }
+
+    /// A polynomial with start coefficients of `t^0, t^1, …` (t in s): one number for a constant, two for a line.
+    pub fn polynomial(start: &[f64]) -> Self {
+        let degree = Some(start.len().saturating_sub(1));
+        let start = StartSpec::List(start.to_vec());
+        Self {
+            degree,
+            ..Self::estimated(BasisName::Polynomial, start)
+        }
+    }
+
+    /// Sets the knots of a piecewise function or spline.
+    #[must_use]
+    pub fn knots(mut self, knots: KnotSpec) -> Self {
+        self.knots = Some(knots);
+        self
+    }
+
+    /// Lower bound, in the unit of the function.
+    #[must_use]
+    pub fn min(mut self, min: f64) -> Self {
+        self.min = Some(Bound::At(NumberOrColumn::Number(min)));
+        self
+    }
+
+    /// Upper bound, in the unit of the function.
+    #[must_use]
+    pub fn max(mut self, max: f64) -> Self {
+        self.max = Some(Bound::At(NumberOrColumn::Number(max)));
+        self
+    }
+
+    /// Tikhonov penalty `weight * integral (d^order p/dt^order)^2 dt`, `order` 0, 1 or 2.
+    #[must_use]
+    pub fn tikhonov(self, order: usize, weight: f64) -> Self {
+        self.penalty(PenaltySpec::tikhonov(order, WeightChoice::Number(weight)))
+    }
+
+    /// Penalty `weight * total variation`, equal for jumps and slow changes of the same height.
+    #[must_use]
+    pub fn total_variation(self, weight: f64) -> Self {
+        self.penalty(PenaltySpec::total_variation(WeightChoice::Number(weight)))
+    }
+
+    /// Adds a penalty.
+    #[must_use]
+    pub fn penalty(mut self, penalty: PenaltySpec) -> Self {
+        let mut list = self.penalties().to_vec();
+        list.push(penalty);
+        self.penalty = Some(OneOrList::List(list));
+        self
+    }
+
+    /// Width of the law, for laws that have one: the smoothing speed (m/s) of Coulomb friction.
+    #[must_use]
+    pub fn width(mut self, width: f64) -> Self {
+        self.width = Some(width);
+        self
+    }
+
+    /// Its penalties.
+    pub fn penalties(&self) -> &[PenaltySpec] {
+        self.penalty.as_ref().map_or(&[], OneOrList::values)
+    }
 }
 
 words! {
@@ -110,7 +252,7 @@ words! {
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "penalty", extend("expecting" = "a map such as {kind: tikhonov, order: 2, weight: 0.1}"))]
-pub struct PenaltyKeys {
+pub struct PenaltySpec {
     /// Measure of roughness.
     #[schemars(extend("example" = "tikhonov", "needs" = "tv: method gauss-newton or equation-error"))]
     pub kind: PenaltyKind,
@@ -128,6 +270,28 @@ pub struct PenaltyKeys {
     /// For `tikhonov` of order 0: the reference values.
     #[schemars(extend("example" = "1.0", "unit" = "that of the function", "default" = "0", "needs" = "`order: 0`"))]
     pub reference: Option<NumberOrColumn>,
+}
+
+impl PenaltySpec {
+    /// `weight * integral (d^order p/dt^order)^2 dt`.
+    pub fn tikhonov(order: usize, weight: WeightChoice) -> Self {
+        Self {
+            kind: PenaltyKind::Tikhonov,
+            order: Some(order),
+            weight,
+            reference: None,
+        }
+    }
+
+    /// `weight * total variation of p`: equal for jumps and slow changes of the same height.
+    pub fn total_variation(weight: WeightChoice) -> Self {
+        Self {
+            kind: PenaltyKind::TotalVariation,
+            order: None,
+            weight,
+            reference: None,
+        }
+    }
 }
 
 words! {

@@ -1,5 +1,7 @@
 //! Values that may be written in several ways.
 
+use crate::constraints::TimeHistory;
+use crate::functions::WeightRule;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
@@ -143,17 +145,6 @@ impl fmt::Display for ColumnId {
     }
 }
 
-/// A number, or the word `estimate`.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(untagged)]
-#[schemars(inline)]
-pub enum NumberOrEstimate {
-    /// Given.
-    Number(f64),
-    /// Estimated with the functions.
-    Estimate(EstimateWord),
-}
-
 /// Standard deviation of the samples: a number, a column of the file, or the word `estimate`.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
@@ -191,21 +182,6 @@ pub enum KnotSpec {
     Auto(AutoWord),
 }
 
-words! {
-    /// Rule that chooses the weight of a penalty from the data.
-    pub enum WeightRuleName {
-        /// Discrepancy principle: the largest weight whose residuals agree with the noise.
-        Discrepancy = "discrepancy",
-        /// Restricted maximum likelihood of noise and smoothness; each penalty has its own weight.
-        RestrictedLikelihood = "reml",
-        /// Weight at which the function resolves changes within one dominant period of the response.
-        Period = "period",
-        /// For `tv`: Bayesian information criterion with the number of levels as degrees of freedom; then a fit without the
-        /// penalty on the jumps found.
-        Bic = "bic",
-    }
-}
-
 /// The weight of a penalty: a number, or the name of a rule.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
@@ -214,7 +190,7 @@ pub enum WeightChoice {
     /// Given.
     Number(f64),
     /// Chosen from the data by a rule.
-    Rule(WeightRuleName),
+    Rule(WeightRule),
 }
 
 /// A column of a file with times in `t_s`, interpolated linearly between its rows.
@@ -237,12 +213,15 @@ pub struct ColumnSpec {
 pub enum NumberOrColumn {
     /// The same number at all times.
     Number(f64),
-    /// Values over time.
+    /// Values over time, in a file.
     Column(ColumnSpec),
+    /// Values at the nodes.
+    #[serde(skip)]
+    History(TimeHistory),
 }
 
 /// Known values: a number with its standard deviation, or a column of a file with times in `t_s`.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(
     rename = "known_value",
@@ -277,8 +256,11 @@ pub enum KnownValue {
     Number(f64),
     /// Not known: all other coefficients are ratios to this mass.
     Unknown(UnknownWord),
-    /// Number with its standard deviation, or values over time.
+    /// Number with its standard deviation, or values over time, in a file.
     Map(KnownValueMap),
+    /// Values at the nodes.
+    #[serde(skip)]
+    History(TimeHistory),
 }
 
 /// A bound of a function: a number or a column, or the word `none`.
@@ -301,6 +283,9 @@ pub enum StartSpec {
     Number(f64),
     /// One value per parameter; their meaning depends on the basis.
     List(Vec<f64>),
-    /// Values over time.
+    /// Values over time, in a file.
     Column(ColumnSpec),
+    /// Values at the nodes, projected onto the basis.
+    #[serde(skip)]
+    Nodal(Vec<f64>),
 }

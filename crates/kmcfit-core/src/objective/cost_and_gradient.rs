@@ -85,8 +85,9 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
     use crate::functions::Parameterization;
+    use crate::model::CoefficientSpec;
     use crate::system::Grid;
     use crate::system::Method;
 

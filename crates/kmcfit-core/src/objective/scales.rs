@@ -204,7 +204,8 @@ pub fn state_scales(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
     use crate::system::Grid;
 
     /// `A sin(w t)` over whole periods has the rms `A / sqrt(2)` for every kind of sensor, also with an offset.

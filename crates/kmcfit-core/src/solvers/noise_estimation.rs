@@ -340,7 +340,8 @@ fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
     use crate::solvers::{Solver, Status, Stopping, fit_from};
     use crate::system::Grid;
     use std::time::Duration;

@@ -224,7 +224,8 @@ pub(super) fn judged(outcome: Outcome, optimality: Option<&Optimality>) -> Outco
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     /// Few parameters need two numbers a sample, and not the 4000 bytes a node of a program with states.
     #[test]

@@ -203,7 +203,8 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
     use crate::solvers::{IterationRecord, fit, fit_from};
     use crate::system::Grid;
 

@@ -3,13 +3,13 @@
 
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
-use kmcfit_core::internals::builder::{
-    Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec, SensorSpec,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::model::{DelayValue, ScalarSpec, SensorSpec};
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 400;
@@ -76,15 +76,11 @@ impl Case {
 
     fn problem(&self, late: Option<Late>, start: f64) -> Problem {
         let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
-        let delay = ScalarSpec::Estimated {
-            start: Some(start),
-            prior: None,
-        };
         let mut record = Record::new("forced")
             .from_state(0.0, 0.0)
             .force(&times, &self.force);
         if late == Some(Late::Force) {
-            record = record.input_delay(delay);
+            record = record.input_delay(ScalarSpec::starting_at(start));
         }
         for (kind, values, sigma) in &self.channels {
             let inner = MARGIN..SAMPLES - MARGIN;
@@ -93,7 +89,7 @@ impl Case {
             channel.weighting = Some(Weighting::Estimated { sigma: *sigma });
             let is_late = late == Some(Late::Acceleration) && *kind == ChannelKind::Acceleration;
             channel.sensor = SensorSpec {
-                delay: is_late.then_some(delay),
+                delay: is_late.then(|| DelayValue::starting_at(start)),
                 ..SensorSpec::default()
             };
             record = record.channel(channel);

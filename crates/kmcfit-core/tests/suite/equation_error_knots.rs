@@ -3,12 +3,11 @@
 
 use crate::common::forced::{response, rms, white};
 use kmcfit_core::internals::assessment::EquationErrorIntervals;
-use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, Start,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::identifiability::Band;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{FitSettings, Solver, fit};
+use kmcfit_core::model::{AutoWord, CoefficientSpec, KnotSpec};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -70,8 +69,7 @@ fn coverage(course: Course, is_forced: bool, noise: f64, seed: u64) -> [f64; 2] 
         true => (record.force(&times, &force), CoefficientSpec::constant(1.5)),
         false => (record, CoefficientSpec::fixed(MASS)),
     };
-    let start = Start::Constant(70.0);
-    let stiffness = CoefficientSpec::estimated(BasisSpec::BSpline(Knots::Auto), start);
+    let stiffness = CoefficientSpec::b_spline(2, 70.0).knots(KnotSpec::Auto(AutoWord));
     let builder = Builder::new([mass, CoefficientSpec::constant(0.2), stiffness]);
     let builder = builder.record(record).solver(Solver::EquationError);
     let problem = builder.build().expect("a problem");

@@ -4,11 +4,12 @@
 use crate::common::counts::seeds;
 use crate::common::forced::{response, rms, white};
 use kmcfit_core::internals::assessment::EquationErrorIntervals;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Solver, Status, fit};
+use kmcfit_core::model::CoefficientSpec;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -4,13 +4,14 @@
 
 use crate::common::forced::white;
 use kmcfit_core::internals::assessment::EquationErrorIntervals;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{
     Fit, FitSettings, MissingTerm, Solver, equation_balance, fit, missing_terms,
 };
+use kmcfit_core::model::CoefficientSpec;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -3,9 +3,10 @@
 
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
+use kmcfit_core::model::CoefficientSpec;
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 400;

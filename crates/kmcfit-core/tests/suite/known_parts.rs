@@ -3,13 +3,14 @@
 use crate::common::closed_form::constant_coefficients;
 use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::constraints::TimeHistory;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::State;
+use kmcfit_core::model::CoefficientSpec;
 use nalgebra::DMatrix;
 
 const SPACING: f64 = 0.02;
@@ -75,7 +76,7 @@ fn carriage(samples: usize) -> Builder {
         values: slowly,
     });
     let block = CoefficientSpec::uncertain(1.4, 0.05);
-    let part = |spec: CoefficientSpec| CoefficientSpec::shared().known_part(spec);
+    let part = |spec: CoefficientSpec| CoefficientSpec::default().known_part(spec);
     Builder::new([
         CoefficientSpec::piecewise_linear(4, 2.0),
         CoefficientSpec::uncertain(1.5, 0.2),
@@ -243,7 +244,7 @@ fn weighed(seed: u64) -> Problem {
     .record(record(0, "bare", 0.0));
     for (i, ([block, sigma], error)) in BLOCKS.into_iter().zip(errors).enumerate() {
         let part = CoefficientSpec::uncertain(block + sigma * error, sigma);
-        let own = CoefficientSpec::shared().known_part(part);
+        let own = CoefficientSpec::default().known_part(part);
         let record = record(i + 1, &format!("block {}", i + 1), block);
         builder = builder.record(record.coefficient(CoefficientKind::MASS, own));
     }

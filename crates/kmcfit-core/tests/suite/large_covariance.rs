@@ -1,13 +1,15 @@
 //! Covariance of fits with more than 64 parameters, by the banded factor, beside dense decompositions.
 
 use crate::common::forced::{broadband, response, white};
+use kmcfit_core::WeightRule;
 use kmcfit_core::internals::assessment::quantities_of_many;
-use kmcfit_core::internals::builder::{Builder, CoefficientSpec, PenaltyWeight, Record, Roughness};
+use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::constraints::Constraint;
-use kmcfit_core::internals::functions::{CoefficientKind, WeightRule};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{Bands, CovarianceKind, Quantities};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::model::{CoefficientSpec, PenaltySpec, WeightChoice};
 
 const SIGMA: f64 = 2e-3;
 
@@ -54,12 +56,8 @@ fn both(problem: &Problem) -> (Quantities, Vec<[f64; 2]>) {
 }
 
 /// A stiffness with one value per step, smoothed by its second derivative.
-fn nodal(spacing: f64, samples: usize, seed: u64, weight: PenaltyWeight) -> Builder {
-    let stiffness = CoefficientSpec::nodal(55.0).penalty(Roughness::Tikhonov {
-        order: 2,
-        weight,
-        reference: None,
-    });
+fn nodal(spacing: f64, samples: usize, seed: u64, weight: WeightChoice) -> Builder {
+    let stiffness = CoefficientSpec::nodal(55.0).penalty(PenaltySpec::tikhonov(2, weight));
     Builder::new([
         CoefficientSpec::constant(2.0),
         CoefficientSpec::constant(1.0),
@@ -79,8 +77,8 @@ const TOLERANCE: f64 = 1e-6;
 
 #[test]
 fn standard_errors_are_those_of_dense_decompositions() {
-    let given = PenaltyWeight::Given(0.02);
-    let rule = PenaltyWeight::Rule(WeightRule::RestrictedLikelihood);
+    let given = WeightChoice::Number(0.02);
+    let rule = WeightChoice::Rule(WeightRule::RestrictedLikelihood);
     let start = Constraint::Value {
         of: CoefficientKind::STIFFNESS,
         at: 0.0,
@@ -119,7 +117,7 @@ fn intervals_of_the_mean_stiffness_hold() {
             0.05,
             200,
             100 + seed,
-            PenaltyWeight::Rule(WeightRule::RestrictedLikelihood),
+            WeightChoice::Rule(WeightRule::RestrictedLikelihood),
         );
         let (problem, fit) = fitted(&builder.build().unwrap());
         let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);

@@ -1,11 +1,12 @@
 //! Physical laws and invariances, tested on random systems from a fixed seed.
 
-use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Experiment;
 use kmcfit_core::internals::solvers::Fit;
 use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::model::CoefficientSpec;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 

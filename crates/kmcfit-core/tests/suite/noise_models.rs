@@ -5,7 +5,7 @@
 
 use crate::common::counts::{least_held, seeds, widened};
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::noise::Correlation;
 use kmcfit_core::internals::problem::Problem;
@@ -14,6 +14,7 @@ use kmcfit_core::internals::record::{
 };
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::Method;
+use kmcfit_core::model::CoefficientSpec;
 use std::f64::consts::TAU;
 
 const TRUTH: [f64; 3] = [2.0, 0.06 * TAU * 2.0, TAU * TAU * 2.0];

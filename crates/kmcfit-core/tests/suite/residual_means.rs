@@ -4,12 +4,11 @@
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{Doubt, FitAssessment};
-use kmcfit_core::internals::builder::{
-    Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec, SensorSpec,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::model::{CoefficientSpec, ScalarSpec, SensorSpec};
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 1000;

@@ -5,10 +5,11 @@ use crate::common::forced::{response, white};
 use kmcfit_core::internals::assessment::{
     Doubt, FitAssessment, function_summaries, verdict_reasons,
 };
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{FitSettings, Initial, fit_with_noise};
+use kmcfit_core::model::CoefficientSpec;
 use std::f64::consts::TAU;
 
 const STIFFNESS: f64 = TAU * TAU;

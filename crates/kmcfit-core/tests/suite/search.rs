@@ -5,12 +5,11 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, Start,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::model::{BasisName, CoefficientSpec, KnotSpec, StartSpec};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -90,10 +89,10 @@ fn case(seed: u64, (channel, noise): Kind) -> Case {
 }
 
 /// The problem of a case, started at `start` of each function.
-fn problem(case: &Case, start: impl Fn(usize) -> Start) -> Problem {
+fn problem(case: &Case, start: impl Fn(usize) -> StartSpec) -> Problem {
     let spec = |f: usize| {
-        let basis = BasisSpec::PiecewiseLinear(Knots::Count(case.knots[f].len()));
-        CoefficientSpec::estimated(basis, start(f))
+        CoefficientSpec::estimated(BasisName::PiecewiseLinear, start(f))
+            .knots(KnotSpec::Count(case.knots[f].len()))
     };
     let mut channel = ChannelSpec::new(case.channel, &case.times, &case.samples);
     channel.weighting = Some(Weighting::Sigma(case.sigma));
@@ -116,8 +115,8 @@ fn fitted(problem: &Problem) -> Fit {
 /// Cost of the fit from the distant start over that of the fit from the truth.
 fn ratio(seed: u64, kind: Kind) -> f64 {
     let case = case(seed, kind);
-    let near = problem(&case, |f| Start::Parameters(case.knots[f].clone()));
-    let far = problem(&case, |f| Start::Constant(LEVELS[f] * case.factors[f]));
+    let near = problem(&case, |f| StartSpec::List(case.knots[f].clone()));
+    let far = problem(&case, |f| StartSpec::Number(LEVELS[f] * case.factors[f]));
     let [near, far] = [near, far].map(|problem| fitted(&problem).best.evaluation.cost);
     far / near
 }

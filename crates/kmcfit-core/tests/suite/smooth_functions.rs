@@ -6,16 +6,14 @@
 use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
 use kmcfit_core::internals::assessment::BasisTest;
-use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, PenaltyWeight, Record, Roughness,
-    Start,
-};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::{Bands, Classification, classify_functions};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, choose_weight, fit_with_noise};
 use kmcfit_core::internals::system::Method;
+use kmcfit_core::model::{AutoWord, CoefficientSpec, KnotSpec, PenaltySpec, WeightChoice};
 use std::f64::consts::TAU;
 
 const MASS: f64 = 2.0;
@@ -61,16 +59,12 @@ fn noise(seed: u64, coefficient: f64) -> Vec<f64> {
 
 type Data = (Vec<f64>, Vec<f64>, Vec<f64>);
 
-fn penalty(rule: WeightRule) -> Roughness {
-    Roughness::Tikhonov {
-        order: 2,
-        weight: PenaltyWeight::Rule(rule),
-        reference: None,
-    }
+fn penalty(rule: WeightRule) -> PenaltySpec {
+    PenaltySpec::tikhonov(2, WeightChoice::Rule(rule))
 }
 
 fn automatic() -> CoefficientSpec {
-    CoefficientSpec::estimated(BasisSpec::BSpline(Knots::Auto), Start::Constant(LEVEL))
+    CoefficientSpec::b_spline(2, LEVEL).knots(KnotSpec::Auto(AutoWord))
 }
 
 /// The oscillator with 3 % noise, constant mass and damping, and this stiffness.

@@ -1,7 +1,7 @@
 //! Covariances and sigmas of estimates under Gaussian noise and with outliers, without bounds and penalties.
 
 use crate::common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
-use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
@@ -13,6 +13,7 @@ use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sen
 use kmcfit_core::internals::solvers::fit_with_noise;
 use kmcfit_core::internals::structure::{Law, Structure};
 use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::model::CoefficientSpec;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -6,13 +6,14 @@ use crate::common;
 use crate::common::counts::{seeds, widened};
 use crate::common::synthetic::with_noise;
 use kmcfit_core::internals::assessment::FitAssessment;
-use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, CoefficientSpec, Knots, PenaltyWeight, Record, Roughness, Start,
-};
+use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::{Classification, Condition};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Status, WeightPath, choose_weight};
+use kmcfit_core::model::{
+    BasisName, CoefficientSpec, KnotSpec, PenaltySpec, StartSpec, WeightChoice,
+};
 use std::ops::Range;
 
 const MASS: f64 = 1.0;
@@ -50,17 +51,20 @@ fn response(levels: &[f64], jumps: &[f64]) -> Vec<f64> {
     values
 }
 
-fn problem(levels: &[f64], jumps: &[f64], basis: BasisSpec, seed: u64) -> Problem {
+fn problem(levels: &[f64], jumps: &[f64], basis: BasisName, seed: u64) -> Problem {
     let times: Vec<f64> = (0..SAMPLES).map(|i| STEP * i as f64).collect();
     let clean = response(levels, jumps);
     let sigma = 0.025 * common::synthetic::rms(&clean);
     let samples = with_noise(&clean, sigma, seed);
-    let stiffness = CoefficientSpec::estimated(basis, Start::Constant(5.0));
-    let weight = PenaltyWeight::Rule(WeightRule::Bic);
+    let stiffness = CoefficientSpec {
+        knots: (basis == BasisName::PiecewiseConstant).then_some(KnotSpec::Count(CELLS + 1)),
+        ..CoefficientSpec::estimated(basis, StartSpec::Number(5.0))
+    };
+    let weight = WeightChoice::Rule(WeightRule::Bic);
     let parts = [
         CoefficientSpec::fixed(MASS),
         CoefficientSpec::constant(0.1),
-        stiffness.penalty(Roughness::TotalVariation { weight }),
+        stiffness.penalty(PenaltySpec::total_variation(weight)),
     ];
     let record = Record::new("decay").from_state(1.0, 0.0);
     let record = record.displacement(&times, &samples).sigma(sigma);
@@ -68,10 +72,6 @@ fn problem(levels: &[f64], jumps: &[f64], basis: BasisSpec, seed: u64) -> Proble
         .record(record)
         .build()
         .expect("a problem")
-}
-
-fn cells() -> BasisSpec {
-    BasisSpec::PiecewiseConstant(Knots::Count(CELLS + 1))
 }
 
 fn found(problem: &Problem) -> (WeightPath, Problem, Fit) {
@@ -101,12 +101,12 @@ struct Counts {
     held: usize,
 }
 
-fn count(levels: &[f64], jumps: &[f64], basis: &BasisSpec, seeds: Range<u64>) -> Counts {
+fn count(levels: &[f64], jumps: &[f64], basis: BasisName, seeds: Range<u64>) -> Counts {
     let mut counts = Counts::default();
     for seed in seeds {
         counts.seeds += 1;
         let truth: Vec<f64> = jumps.iter().map(|t| t - 0.5 * STEP).collect();
-        let whole = problem(levels, &truth, basis.clone(), seed);
+        let whole = problem(levels, &truth, basis, seed);
         let (_, reduced, fit) = found(&whole);
         assert_eq!(fit.outcome.status, Status::Converged, "{seed}");
         let times = &reduced.jumps[0].times;
@@ -151,7 +151,12 @@ fn jumps_at_knots_are_found_and_their_levels_hold() {
     for (case, (levels, jumps)) in (0..).zip(CASES) {
         // Other noise in each case: with the same noise the intervals of all cases hold together.
         let first = 1000 * case;
-        let counts = count(levels, jumps, &cells(), first..first + seeds);
+        let counts = count(
+            levels,
+            jumps,
+            BasisName::PiecewiseConstant,
+            first..first + seeds,
+        );
         println!("{jumps:?}: {counts:?}");
         intervals += counts.intervals;
         held += counts.held;
@@ -169,7 +174,7 @@ fn jumps_at_knots_are_found_and_their_levels_hold() {
 #[test]
 fn jumps_between_nodes_are_found() {
     let (levels, jumps) = (&[4.0, 3.2], &[12.57]);
-    let counts = count(levels, jumps, &BasisSpec::Nodal, 0..5);
+    let counts = count(levels, jumps, BasisName::Nodal, 0..5);
     println!("{counts:?}");
     assert_eq!(counts.right_number, counts.seeds);
     assert!(largest(&counts.distances) <= 3.0 * STEP, "{counts:?}");
@@ -178,7 +183,7 @@ fn jumps_between_nodes_are_found() {
 #[test]
 fn functions_are_conditional_on_the_jumps() {
     for (levels, jumps) in CASES {
-        let whole = problem(levels, jumps, cells(), 3);
+        let whole = problem(levels, jumps, BasisName::PiecewiseConstant, 3);
         let (path, reduced, fit) = found(&whole);
         let least = path
             .points

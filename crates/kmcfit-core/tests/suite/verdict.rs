@@ -6,9 +6,10 @@ use kmcfit_core::internals::assessment::{
     Doubt, EstimateStatus, FitAssessment, VerdictAssumption, estimates, verdict_assumptions,
     verdict_reasons,
 };
-use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::model::CoefficientSpec;
 use std::f64::consts::TAU;
 
 const SPACING: f64 = 0.05;

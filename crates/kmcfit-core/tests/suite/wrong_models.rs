@@ -10,13 +10,14 @@ use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{
     ClassicalEstimate, Doubt, FitAssessment, RecordError, VerdictLevel, estimates, verdict_reasons,
 };
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, NoiseModel, Weighting};
 use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::InputSample;
+use kmcfit_core::model::{CoefficientSpec, ScalarSpec};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -226,10 +227,7 @@ impl Case {
         };
         let mut record = Record::new("record");
         record = match self.is_free {
-            true => record.initial([1.1, 0.0].map(|start| ScalarSpec::Estimated {
-                start: Some(start),
-                prior: None,
-            })),
+            true => record.initial([1.1, 0.0].map(ScalarSpec::starting_at)),
             false => {
                 let sign = if self.kind == Kind::ForceSign {
                     -1.0

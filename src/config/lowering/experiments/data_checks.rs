@@ -18,8 +18,7 @@ use kmcfit_core::internals::signal::{
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::both;
 use kmcfit_core::model::KnownValue;
-use kmcfit_core::model::NumberOrEstimate;
-use kmcfit_core::model::ScalarOr;
+use kmcfit_core::model::ScalarSpec;
 use kmcfit_core::model::{ExperimentSpec, InitialSpec};
 use serde_json::json;
 use std::cell::OnceCell;
@@ -157,7 +156,7 @@ fn unit_factors(
     let first = |kind: ChannelKind| record.channels.iter().find(|c| c.kind == kind);
     let displacement = first(ChannelKind::Displacement);
     if let (Some(channel), InitialSpec::Map(state)) = (displacement, &spec.initial)
-        && let ScalarOr::Scalar(NumberOrEstimate::Number(start)) = &state.displacement
+        && let ScalarSpec::Known(start) = &state.displacement
         && *start != 0.0
     {
         let ratio = (channel.values[0] / start).abs();
@@ -247,7 +246,7 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
     let stated = match (file.spec.functions.get(CoefficientKind::MASS)?.fixed).as_ref()? {
         KnownValue::Number(number) => *number,
         KnownValue::Map(map) => map.value?,
-        KnownValue::Unknown(_) => return None,
+        KnownValue::Unknown(_) | KnownValue::History(_) => return None,
     };
     let channel = record.channels.first()?;
     let spacing = channel.spacing?;
@@ -294,7 +293,7 @@ fn opposite_signs(
 fn gain_sign(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
     match sensor_of(spec, kind).and_then(|sensor| sensor.gain.as_ref()) {
         None => Some(1.0),
-        Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.signum()),
+        Some(ScalarSpec::Known(gain)) => Some(gain.signum()),
         Some(_) => None,
     }
 }

@@ -5,11 +5,8 @@ use super::{Entry, RawRecord};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::number_format::significant;
-use kmcfit_core::internals::builder::ScalarSpec;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::system::Grid;
-use kmcfit_core::model::NumberOrEstimate;
-use kmcfit_core::model::ScalarOr;
 use kmcfit_core::model::{DelayValue, ExperimentSpec, InputSensorSpec};
 use serde_json::json;
 use std::sync::Arc;
@@ -51,14 +48,11 @@ impl Delay {
         }
     }
 
-    /// The parameter of the core; `None` for a stated delay, which is in the times.
-    pub fn parameter(self) -> Option<ScalarSpec> {
+    /// Start of an estimated delay; `None` for a stated one, which is in the times.
+    pub fn start(self) -> Option<f64> {
         match self {
             Self::Known(_) => None,
-            Self::Estimated { start, .. } => Some(ScalarSpec::Estimated {
-                start: Some(start),
-                prior: None,
-            }),
+            Self::Estimated { start, .. } => Some(start),
         }
     }
 }
@@ -99,15 +93,15 @@ fn delay(
     let usual = LIMIT * spacing;
     let (start, range) = match given {
         None => return Ok(Delay::Known(0.0)),
-        Some(ScalarOr::Scalar(NumberOrEstimate::Number(delay))) => {
+        Some(DelayValue::Known(delay)) => {
             return Ok(Delay::Known(*delay));
         }
-        Some(ScalarOr::Scalar(NumberOrEstimate::Estimate(_))) => (0.0, [-usual, usual]),
-        Some(ScalarOr::Map(spec)) => {
+        Some(DelayValue::Estimate(_)) => (0.0, [-usual, usual]),
+        Some(DelayValue::Estimated(spec)) => {
             let start = spec.start;
             let around = start.unwrap_or(0.0);
             let least = spec.min.unwrap_or(around - usual);
-            let most = spec.max.map_or(around + usual, |d| d);
+            let most = spec.max.unwrap_or(around + usual);
             let middle = if (least..=most).contains(&0.0) {
                 0.0
             } else {

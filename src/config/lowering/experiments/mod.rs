@@ -21,19 +21,16 @@ pub(in crate::config) use channel::sensor_of;
 pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
 pub(in crate::config) use excitation::known_stretches;
-use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
-use kmcfit_core::internals::functions::{Prior, ScalarParameter};
+use kmcfit_core::internals::builder::{self, ChannelSpec, listed};
+use kmcfit_core::internals::functions::ScalarParameter;
 use kmcfit_core::internals::record::{
     BaseMotion, ChannelKind, Experiment, Input, InputNoiseKind, Waveform,
 };
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
-use kmcfit_core::model::ScalarOr;
 use kmcfit_core::model::{
-    EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
-    SensorKeys,
+    DelayValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec, ScalarSpec,
 };
-use kmcfit_core::model::{EstimateWord, NumberOrEstimate};
 use std::sync::Arc;
 
 pub(super) use data_checks::MISSING_CODES;
@@ -264,12 +261,11 @@ pub(super) fn specification(
     defaults: functions::Defaults<'_>,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = entry.spec;
-    let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate(EstimateWord));
     let initial = match &spec.initial {
-        InitialSpec::Scalar(EstimateWord) => [&estimate, &estimate],
-        InitialSpec::Map(state) => [&state.displacement, &state.velocity],
+        InitialSpec::Scalar(_) => [ScalarSpec::ESTIMATED; 2],
+        InitialSpec::Map(state) => [state.displacement, state.velocity],
     };
-    let mut found = builder::Record::new(entry.name()).initial(initial.map(scalar));
+    let mut found = builder::Record::new(entry.name()).initial(initial);
     if is_held_out(spec) {
         found = found.validation();
     }
@@ -287,14 +283,14 @@ pub(super) fn specification(
     }
     let mut notes = Vec::new();
     if let Some(record) = record {
-        if let Some(delay) = delays::of_input(entry, record.spacing())?.parameter() {
-            found = found.input_delay(delay);
+        if let Some(start) = delays::of_input(entry, record.spacing())?.start() {
+            found = found.input_delay(ScalarSpec::starting_at(start));
         }
         found = found.input(record.input);
         for raw in record.channels {
             notes.push(raw.note());
             let delay = delays::of_channel(entry, raw.kind, raw.median_spacing)?;
-            found = found.channel(channel(spec, raw, delay.parameter()));
+            found = found.channel(channel(spec, raw, delay.start()));
         }
     }
     Ok((found, notes))
@@ -321,33 +317,15 @@ fn input_sigma<'a>(
     }
 }
 
-/// A number that is fixed or estimated.
-fn scalar(given: &EstimateValue) -> ScalarSpec {
-    match given {
-        ScalarOr::Scalar(NumberOrEstimate::Number(number)) => ScalarSpec::Known(*number),
-        ScalarOr::Scalar(NumberOrEstimate::Estimate(EstimateWord)) => ScalarSpec::ESTIMATED,
-        ScalarOr::Map(spec) => ScalarSpec::Estimated {
-            start: spec.start,
-            prior: spec.prior.as_ref().map(|prior| Prior {
-                mean: prior.mean,
-                sigma: prior.sigma,
-            }),
-        },
-    }
-}
-
-fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<ScalarSpec>) -> ChannelSpec {
-    let sensor = |given: &SensorKeys| builder::SensorSpec {
-        gain: given.gain.as_ref().map(scalar),
-        offset: given.offset.as_ref().map(scalar),
-        drift: given.drift.as_ref().map(scalar),
-        delay,
-        absolute: given.absolute,
-    };
-    let given = channel::sensor_of(spec, raw.kind);
+fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<f64>) -> ChannelSpec {
+    let mut sensor = channel::sensor_of(spec, raw.kind)
+        .cloned()
+        .unwrap_or_default();
+    // Known delays have been taken off the times of the samples.
+    sensor.delay = delay.map(DelayValue::starting_at);
     ChannelSpec {
         kind: raw.kind,
-        sensor: given.map(sensor).unwrap_or_default(),
+        sensor,
         weighting: raw.weighting,
         loss: raw.loss,
         noise: raw.noise,

@@ -73,7 +73,7 @@ impl QuantityColumn<'_> {
 
     fn given_unit(
         &self,
-        text: &String,
+        text: &str,
         warnings: &mut Vec<Finding>,
     ) -> Result<ScaledUnit, InputError> {
         let units_key = self.key("units");

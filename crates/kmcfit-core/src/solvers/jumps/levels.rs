@@ -191,7 +191,8 @@ impl<'a> LevelModel<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     #[test]
     fn neighbours_within_the_tolerance_are_one_level() {

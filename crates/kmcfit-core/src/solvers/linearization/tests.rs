@@ -1,9 +1,10 @@
 use super::halves::Half;
 use super::*;
-use crate::builder::{Builder, CoefficientSpec, Record};
+use crate::builder::{Builder, Record};
 use crate::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter,
 };
+use crate::model::CoefficientSpec;
 use crate::noise::{Autoregression, Correlation, CorrelationLaw};
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, NoiseEstimate, Weighting};

@@ -1,5 +1,6 @@
 use super::*;
-use crate::builder::{Builder, CoefficientSpec, Record};
+use crate::builder::{Builder, Record};
+use crate::model::CoefficientSpec;
 use crate::solvers::{Stopping, fit_from};
 use crate::system::Grid;
 

@@ -357,7 +357,8 @@ impl<'a> Descent<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{BasisSpec, Builder, CoefficientSpec, Knots, Record, Start};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
 
     /// A problem of unit mass and free damping for a free decay of 5 rad/s in 40 s.
     fn decay(stiffness: CoefficientSpec) -> Problem {
@@ -371,8 +372,7 @@ mod tests {
     }
 
     fn on_three_knots() -> CoefficientSpec {
-        let basis = BasisSpec::PiecewiseLinear(Knots::Count(3));
-        CoefficientSpec::estimated(basis, Start::Constant(25.0))
+        CoefficientSpec::piecewise_linear(3, 25.0)
     }
 
     /// Constants are scanned within an octave of the frequency of the record, a stiffness on knots over the whole range.

@@ -1,7 +1,7 @@
 //! Predictions under a new force: coverage of their bands.
 
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientSet};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
@@ -11,6 +11,7 @@ use kmcfit_core::internals::signal::{Interpolation, Signal};
 use kmcfit_core::internals::solvers::{FitSettings, Initial, fit_with_noise};
 use kmcfit_core::internals::study::IdentifiedSystem;
 use kmcfit_core::internals::system::{Grid, State};
+use kmcfit_core::model::CoefficientSpec;
 use std::f64::consts::TAU;
 
 const MASS: f64 = 2.0;

@@ -19,7 +19,7 @@ use kmcfit_core::internals::system::Grid;
 use kmcfit_core::model::ScalarOr;
 use kmcfit_core::model::{ColumnId, SigmaValue};
 use kmcfit_core::model::{
-    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorKeys,
+    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
 };
 use noise::{loss, noise_model, weighting, with_quantisation};
 use sampling::{band, decimate};
@@ -81,7 +81,7 @@ struct Spec<'a> {
     sigma: Option<&'a SigmaValue>,
     loss: Option<&'a ScalarOr<LossName, LossSpec>>,
     noise: Option<&'a ScalarOr<CorrelationName, CorrelationSpec>>,
-    sensor: Option<&'a SensorKeys>,
+    sensor: Option<&'a SensorSpec>,
 }
 
 fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
@@ -106,7 +106,7 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
 }
 
 /// Settings of the sensor of a channel in the model file.
-pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorKeys> {
+pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
     spec_of(spec, kind).sensor
 }
 

@@ -415,7 +415,8 @@ impl<'a> Cost<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::builder::{Builder, Record};
+    use crate::model::CoefficientSpec;
     use crate::system::Grid;
 
     /// Accelerations at every fifth quarter of a step under a motion of the base, and displacements at the nodes under a force; ten

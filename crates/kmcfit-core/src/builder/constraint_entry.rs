@@ -3,15 +3,12 @@
 //! Units: bounds, means and values in the unit of the function, slopes in that unit per s, integrals in that unit times s, times in s,
 //! frequencies in Hz, ratios in the unit of the first function per that of the second; damping ratios are dimensionless.
 
-use crate::config::lowering::Place;
-use crate::config::lowering::functions::history;
-use crate::error::InputError;
-use crate::number_format::count;
-use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::system::{Grid, TimePoint};
-use kmcfit_core::model::NumberOrColumn;
-use kmcfit_core::model::{ConstraintSpec, RangeSpec};
+use super::BuildError;
+use super::coefficient::history;
+use crate::constraints::{Constraint, Shape, TimeHistory};
+use crate::functions::CoefficientKind;
+use crate::model::{ConstraintSpec, NumberOrColumn, RangeSpec};
+use crate::system::{Grid, TimePoint};
 
 /// Kind of a constraint, by its key.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,33 +73,33 @@ impl ConstraintKey {
 
 /// One entry of `constraints` and its key.
 struct ConstraintReader<'a> {
-    at: Place<'a>,
+    key: &'a str,
     grid: &'a Grid,
     spec: &'a ConstraintSpec,
 }
 
 /// Returns the constraints of the entry at `key`, each with its key for error messages.
 pub(super) fn read(
-    at: Place<'_>,
+    key: &str,
     grid: &Grid,
     spec: &ConstraintSpec,
-) -> Result<Vec<(String, Constraint)>, InputError> {
-    let reader = ConstraintReader { at, grid, spec };
+) -> Result<Vec<(String, Constraint)>, BuildError> {
+    let reader = ConstraintReader { key, grid, spec };
     let kind = reader.kind()?;
     reader.check_companions(kind)?;
     reader.constraints(kind)
 }
 
 impl ConstraintReader<'_> {
-    fn error(&self, below: &str, problem: impl Into<String>) -> InputError {
+    fn error(&self, below: &str, problem: impl Into<String>) -> BuildError {
         match below {
-            "" => self.at.error(problem),
-            below => self.at.error_in(below, problem),
+            "" => BuildError::new(self.key, problem),
+            below => BuildError::new(format!("{}.{below}", self.key), problem),
         }
     }
 
     /// Returns the kind of the constraint; keys of exactly one kind must be given.
-    fn kind(&self) -> Result<ConstraintKey, InputError> {
+    fn kind(&self) -> Result<ConstraintKey, BuildError> {
         let given: Vec<ConstraintKey> = (ConstraintKey::ALL.iter().map(|(kind, _)| *kind))
             .filter(|kind| kind.is_given(self.spec))
             .collect();
@@ -122,7 +119,7 @@ impl ConstraintReader<'_> {
     }
 
     /// Checks that `function` and `ratio` are given where the kind needs them, and only there.
-    fn check_companions(&self, kind: ConstraintKey) -> Result<(), InputError> {
+    fn check_companions(&self, kind: ConstraintKey) -> Result<(), BuildError> {
         match (kind.is_about_one_function(), self.spec.function) {
             (true, None) => {
                 return Err(self
@@ -166,7 +163,7 @@ impl ConstraintReader<'_> {
     }
 
     /// Returns the constraints of one entry: several for a list of shapes or of times, one for any other kind.
-    fn constraints(&self, kind: ConstraintKey) -> Result<Vec<(String, Constraint)>, InputError> {
+    fn constraints(&self, kind: ConstraintKey) -> Result<Vec<(String, Constraint)>, BuildError> {
         let spec = self.spec;
         let of = self.target_function();
         let number = |given: Option<f64>| given.unwrap_or(0.0);
@@ -208,32 +205,32 @@ impl ConstraintReader<'_> {
                 Constraint::Passive
             }
         };
-        Ok(vec![(self.at.key.clone(), constraint)])
+        Ok(vec![(self.key.to_owned(), constraint)])
     }
 
     fn bound(
         &self,
         name: &str,
         given: Option<&NumberOrColumn>,
-    ) -> Result<Option<TimeHistory>, InputError> {
-        let read = |given| history(&self.at.below(name), self.grid, given);
+    ) -> Result<Option<TimeHistory>, BuildError> {
+        let read = |given| history(given, &format!("{}.{name}", self.key));
         given.map(read).transpose()
     }
 
-    fn shapes(&self) -> Result<Vec<(String, Constraint)>, InputError> {
+    fn shapes(&self) -> Result<Vec<(String, Constraint)>, BuildError> {
         let Some(shapes) = &self.spec.shape else {
             return Ok(Vec::new());
         };
         self.not_empty("shape", shapes.values().len(), "at least one shape")?;
         let constraint = |(i, &shape): (usize, &Shape)| {
-            let key = format!("{}.shape{}", self.at.key, shapes.suffix(i));
+            let key = format!("{}.shape{}", self.key, shapes.suffix(i));
             let of = self.target_function();
             (key, Constraint::Shape { of, shape })
         };
         Ok(shapes.values().iter().enumerate().map(constraint).collect())
     }
 
-    fn fixed_values(&self) -> Result<Vec<(String, Constraint)>, InputError> {
+    fn fixed_values(&self) -> Result<Vec<(String, Constraint)>, BuildError> {
         let (at, value) = match (&self.spec.at, &self.spec.value) {
             (Some(at), Some(value)) => (at, value),
             (at, _) => {
@@ -275,12 +272,12 @@ impl ConstraintReader<'_> {
                 at: time.clamp(start, end),
                 value: values[i.min(values.len() - 1)],
             };
-            Ok((self.at.below(&below).key, fixed))
+            Ok((format!("{}.{below}", self.key), fixed))
         };
         times.iter().enumerate().map(constraint).collect()
     }
 
-    fn equal(&self) -> Result<Constraint, InputError> {
+    fn equal(&self) -> Result<Constraint, BuildError> {
         let names = self.spec.equal.as_deref().unwrap_or_default();
         match names {
             [first, second] if first != second => Ok(Constraint::Equal {
@@ -296,13 +293,14 @@ impl ConstraintReader<'_> {
                 .error("equal", "an equality needs two functions")
                 .found(match names.len() {
                     0 => "an empty list".to_owned(),
-                    n => count(n, "function"),
+                    1 => "1 function".to_owned(),
+                    n => format!("{n} functions"),
                 })
                 .expected("two functions, as in [damping, stiffness]")),
         }
     }
 
-    fn damping_ratio(&self) -> Result<Constraint, InputError> {
+    fn damping_ratio(&self) -> Result<Constraint, BuildError> {
         let range = self.spec.damping_ratio.as_ref();
         if let Some(min) = range.and_then(|r| r.min) {
             return Err(self
@@ -327,7 +325,7 @@ impl ConstraintReader<'_> {
         &self,
         key: &str,
         range: Option<&RangeSpec>,
-    ) -> Result<(Option<f64>, Option<f64>), InputError> {
+    ) -> Result<(Option<f64>, Option<f64>), BuildError> {
         let end = |end: fn(&RangeSpec) -> Option<f64>| range.and_then(end);
         let (min, max) = (end(|r| r.min), end(|r| r.max));
         match (min, max) {
@@ -346,7 +344,7 @@ impl ConstraintReader<'_> {
         }
     }
 
-    fn positive(&self, key: &str, value: Option<f64>) -> Result<Option<f64>, InputError> {
+    fn positive(&self, key: &str, value: Option<f64>) -> Result<Option<f64>, BuildError> {
         match value {
             Some(value) if value <= 0.0 => Err(self
                 .error(key, "this limit must be positive")
@@ -356,7 +354,7 @@ impl ConstraintReader<'_> {
         }
     }
 
-    fn not_empty(&self, key: &str, count: usize, expected: &str) -> Result<(), InputError> {
+    fn not_empty(&self, key: &str, count: usize, expected: &str) -> Result<(), BuildError> {
         match count {
             0 => Err(self
                 .error(key, "the list is empty")
