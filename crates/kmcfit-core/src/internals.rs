@@ -14,8 +14,7 @@ pub mod assessment {
 }
 pub mod builder {
     pub use crate::builder::{
-        BuildError, BuildNotice, Builder, ChannelSpec, Contradiction, Record, UNKNOWN_MASS,
-        WeightSearch, listed,
+        BuildError, Builder, ChannelSpec, Contradiction, Record, UNKNOWN_MASS, WeightSearch, listed,
     };
 }
 pub mod constraints {
