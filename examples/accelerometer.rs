@@ -31,7 +31,8 @@ pub fn found() -> Result<[[f64; 2]; 3], Box<dyn Error>> {
     let bands = Bands::at(&problem, &best.parameters, &best.evaluation);
     Ok([0, 1, 2].map(|j| {
         let band = &bands.functions[j];
-        [band.values[0], band.standard_error[0]]
+        let point = &band.points[0];
+        [point.value, point.standard_error]
     }))
 }
 

@@ -1,6 +1,6 @@
 //! Findings, warnings and suggestions of a document: severity, kind, quantities and a sentence.
 
-use kmcfit_core::internals::assessment::Severity;
+use kmcfit_core::internals::assessment::{Doubt, Severity};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt;
@@ -19,6 +19,9 @@ pub struct Finding {
     pub quantities: Map<String, Value>,
     /// The sentence.
     pub text: String,
+    /// The doubt that it states, for decisions; not in files.
+    #[serde(skip)]
+    pub doubt: Option<Doubt>,
 }
 
 fn is_note(level: &Severity) -> bool {
@@ -33,6 +36,16 @@ impl Finding {
             kind: kind.into(),
             quantities: Map::new(),
             text: text.into(),
+            doubt: None,
+        }
+    }
+
+    /// The finding as the statement of a doubt.
+    #[must_use]
+    pub fn about(self, doubt: Doubt) -> Self {
+        Self {
+            doubt: Some(doubt),
+            ..self
         }
     }
 

@@ -15,7 +15,7 @@ use crate::report::{
 };
 use crate::results::{OutputFolder, RESULT};
 use console::Term;
-use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::internals::assessment::{Doubt, VerdictLevel};
 use kmcfit_core::internals::host::Instant;
 use kmcfit_core::internals::solvers::{IterationEvent, IterationRecord, Observer};
 use serde::Serialize;
@@ -142,8 +142,8 @@ pub(super) fn read(file: &ModelFile) -> Result<Model, InputError> {
 
 /// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.
 pub(super) fn code(document: &ResultDocument, printed: &Printed) -> u8 {
-    let mut reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
-    let by_end = match reasons.any(|reason| reason.kind == "stopped") {
+    let mut reasons = document.reasons();
+    let by_end = match reasons.any(|reason| matches!(reason, Doubt::Stopped { .. })) {
         true => interrupt::exit_code(),
         false => exit_code(document.outcome.status),
     };

@@ -125,10 +125,10 @@ impl StudyRun {
         let bands = || study::bands(of_fit, &model);
         self.document.bands = Some(self.analysis("bands", bands)?);
         for target in &plan.profiles {
-            let Some(of) = study::linear(at.problem, target) else {
+            let Some(of) = target.at(at.problem, at.theta) else {
                 continue;
             };
-            let profile = || study::profile_of(at, &of, &model);
+            let profile = || study::profile_of(at, target, &model);
             let name = format!("profile of {}", of.name);
             match self.analysis(&name, profile)? {
                 Ok(found) => self.document.profiles.push(found),

@@ -22,8 +22,8 @@ mod syntax;
 mod yaml_errors;
 
 pub use lowering::{
-    AutomaticGrid, BuildMode, ChannelNote, HoldOut, Model, Preparation, StudyPlan, StudyTarget,
-    WeightSearch, build,
+    AutomaticGrid, BuildMode, ChannelNote, HoldOut, Model, Preparation, StudyPlan, WeightSearch,
+    build,
 };
 pub use model_file::{ModelFile, is_record};
 pub use new_record::{MeasuredChannel, NewRecord};

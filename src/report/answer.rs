@@ -1,10 +1,10 @@
 //! The answer of a fit as a table: estimates with their confidence intervals, units and status.
 
-use super::document::{ResultDocument, Verdict};
+use super::document::ResultDocument;
 use super::ratios;
 use super::text::aligned_to;
 use crate::number_format::{resolved, significant};
-use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
+use kmcfit_core::internals::assessment::{Doubt, Estimate, EstimateStatus};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt;
@@ -165,12 +165,9 @@ fn status(document: &ResultDocument, estimate: &Estimate) -> String {
 /// True for an estimate without an interval where more parameters are estimated than the samples determine and no penalty determines the
 /// others: other values explain the samples equally well.
 fn is_not_unique(document: &ResultDocument, estimate: &Estimate) -> bool {
-    let is_deficient =
-        |verdict: &Verdict| verdict.reasons.iter().any(|r| r.kind == "rank_deficient");
+    let is_deficient = |doubt: &Doubt| matches!(doubt, Doubt::RankDeficient { .. });
     let is_estimated = estimate.status != EstimateStatus::Fixed && estimate.ci95.is_none();
-    is_estimated
-        && document.cost.regularisation == 0.0
-        && document.verdict.as_ref().is_some_and(is_deficient)
+    is_estimated && document.cost.regularisation == 0.0 && document.reasons().any(is_deficient)
 }
 
 /// Name of the fixed function that determines the scale of all others.

@@ -8,10 +8,9 @@ use super::{doubts, findings};
 use crate::finding::Finding;
 use crate::number_format::resolved;
 use kmcfit_core::internals::assessment::{Doubt, FunctionSummary, Severity, function_summaries};
-use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
-    Classification, FunctionClassification, structural_rank,
+    Classification, FunctionClassification, Target, structural_rank,
 };
 use kmcfit_core::internals::problem::Jumps;
 use std::collections::BTreeMap;
@@ -24,9 +23,8 @@ impl FittedModel<'_> {
         let mut summary = IdentifiabilitySummary {
             parameters: problem.parameters(),
             assumptions: assumptions(self.model),
-            covariance: (self.run_assessment.bands())
-                .map(|bands| bands.covariance_kind)
-                .or(self.large_covariance().map(|large| large.kind))
+            covariance: (self.run_assessment.quantities())
+                .map(|quantities| quantities.kind)
                 .unwrap_or_default(),
             ..IdentifiabilitySummary::default()
         };
@@ -82,36 +80,22 @@ impl FittedModel<'_> {
         (summary, found)
     }
 
-    /// The doubts of the assessment.
-    pub(super) fn doubts(&self) -> Vec<Doubt> {
-        let assessment = self.run_assessment.assessment.iter();
-        // Of an optimum that identifies no system nothing else is said.
-        let identified = assessment.filter(|a| a.plausibility.unidentified.is_none());
-        let warnings = identified.flat_map(|a| a.plausibility.warnings.iter().cloned());
-        let missing = self.run_assessment.missing_terms.iter();
-        warnings
-            .chain(missing.map(|term| Doubt::MissingTerm(*term)))
-            .collect()
-    }
-
     /// The jumps found in a function, with the levels between them.
     fn jumps(&self, jumps: &Jumps) -> Finding {
         let problem = &self.model.problem;
         let function = problem.functions.get(jumps.function);
         let range = problem.functions.ranges()[jumps.function].clone();
-        let theta = &self.fit.best.parameters[range.clone()];
-        let errors = self.run_assessment.errors();
-        let interval = |(value, j): (&f64, usize)| {
-            let errors = errors?;
-            let covariance = errors.covariance?;
-            let error = covariance[(j, j)].sqrt();
-            let half = student_half_width(errors.degrees_of_freedom[j]) * error;
-            Some([value - half, value + half])
+        let bands = self.run_assessment.bands();
+        let level = |j: usize| {
+            let level = Target::parameter(j).at(problem, &self.fit.best.parameters)?;
+            let value = level.value;
+            let with_error = bands.and_then(|bands| {
+                let covariance = bands.covariance.as_ref()?;
+                Some(level.with_covariance(covariance, bands.degrees_of_freedom[j]))
+            });
+            Some((value, with_error.and_then(|level| level.interval())))
         };
-        let levels = theta.iter().zip(range);
-        let levels: Vec<_> = levels
-            .map(|(value, j)| (*value, interval((value, j))))
-            .collect();
+        let levels: Vec<_> = range.filter_map(level).collect();
         findings::jumps(&function.name(), self.unit(function), &jumps.times, &levels)
     }
 
@@ -139,16 +123,20 @@ impl FittedModel<'_> {
     fn negative_damping(&self) -> Option<Finding> {
         let summaries = self.function_summaries();
         let damping = summaries.get(CoefficientKind::DAMPING.name())?;
-        let (value, half) = (damping.min, damping.half_width()?);
-        let is_constant = damping.max == value && !damping.negligible;
-        (is_constant && value + half < 0.0).then(|| {
-            let [low, high] = resolved([value - half, value + half], half);
+        damping.standard_error?;
+        let means = &self.run_assessment.quantities()?.functions;
+        let mean = means
+            .iter()
+            .find(|mean| mean.name == CoefficientKind::DAMPING.name())?;
+        let ([low, high], half) = (mean.interval()?, mean.half_width());
+        (high < 0.0 && !damping.negligible).then(|| {
+            let [low, high] = resolved([low, high], half);
             let text = format!(
                 "c is negative (95 % CI {low} to {high} {}): the system gains energy",
                 damping.unit
             );
             let finding = Finding::new("negative_damping", text).rated(Severity::Warning);
-            finding.with("value", value).with("half_width", half)
+            finding.with("value", mean.value).with("half_width", half)
         })
     }
 

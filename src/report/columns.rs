@@ -1,7 +1,7 @@
 //! Column headers of functions, ratios and parameters in the tables of a run: name and unit, and `_lo95` and `_hi95` for the ends of a
 //! 95 % interval.
 
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Ratio};
 
 /// Headers of the lower and the upper end of the 95 % interval of a column.
 pub(super) fn interval_columns(column: &str) -> [String; 2] {
@@ -24,21 +24,10 @@ fn column_of_part(column: &str, is_known_part: bool, owner: Option<&str>) -> Str
     }
 }
 
-/// Header of a ratio by the name of its estimate or of its band; `None` for other names.
-pub(super) fn ratio_column(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "k/m" | "k_over_m" => "k_over_m_per_s2",
-        "c/m" | "c_over_m" => "c_over_m_per_s",
-        "natural frequency" | "natural_frequency" => "natural_frequency_Hz",
-        "damping ratio" | "damping_ratio" => "damping_ratio",
-        _ => return None,
-    })
-}
-
 /// Header of a function or ratio by its name in reports: `mass`, `k/m`, `damping of shaker`; `None` for other names.
 pub(super) fn named_column(name: &str, is_rotation: bool) -> Option<String> {
-    if let Some(column) = ratio_column(name) {
-        return Some(column.to_owned());
+    if let Some(ratio) = Ratio::named(name) {
+        return Some(ratio.column().to_owned());
     }
     let part = name.strip_prefix("known part of ");
     let whole = part.unwrap_or(name);

@@ -80,11 +80,9 @@ impl CompletedFit {
         let functions = run.named_functions().into_iter().enumerate();
         let functions = functions.filter(|(_, (_, values))| varies(values));
         let curve = |(i, (function, values)): (usize, (&CoefficientFunction, Vec<f64>))| {
-            let bands = run.bands();
-            let of_function = bands.and_then(|bands| bands.functions.get(i..=i));
-            let limits = bands
-                .zip(of_function)
-                .and_then(|(bands, of_function)| bands.curves(of_function, &t).into_iter().next());
+            let limits = run
+                .bands()
+                .and_then(|bands| Some(bands.functions.get(i)?.curves(&bands.times, &t)));
             let [low, high] = limits.unwrap_or_default();
             CoefficientCurve {
                 name: function.name(),

@@ -233,7 +233,8 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             )
         }
     };
-    Finding::of(doubt, text).rated(doubt.severity())
+    let finding = Finding::of(doubt, text).rated(doubt.severity());
+    finding.about(doubt.clone())
 }
 
 /// A classical estimate beside that of the fit, as a clause.

@@ -2,8 +2,7 @@
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::number_format::at_most;
-use kmcfit_core::internals::functions::Ratios;
-use kmcfit_core::internals::functions::WeightRule;
+use kmcfit_core::internals::functions::{Ratio, WeightRule};
 use kmcfit_core::internals::signal::{even_spacing, median};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath};
 use kmcfit_core::internals::study::PredictedResponse;
@@ -264,34 +263,36 @@ pub fn functions(panels: impl IntoIterator<Item = Panel>) -> Figure {
     .panels(panels)
 }
 
+/// Values of the ratios, in the order of [`Ratio::ALL`].
+pub type RatioCurves = [Vec<f64>; 4];
+
 /// The ratios of the coefficient functions against the times `t` in s, and the true ones if known; a ratio without
 /// values has no panel. `bands` are the lower and upper ends of the bands of the first ratios.
 pub fn ratios(
     t: &[f64],
-    found: &Ratios,
-    truth: Option<&Ratios>,
+    found: &RatioCurves,
+    truth: Option<&RatioCurves>,
     bands: &[[Vec<f64>; 2]],
 ) -> Figure {
-    type Part = fn(&Ratios) -> &[f64];
-    let parts: [(&str, &str, Part); 4] = [
-        ("k/m", "s⁻²", |r| &r.k_over_m),
-        ("c/m", "s⁻¹", |r| &r.c_over_m),
-        ("natural frequency", "Hz", |r| &r.frequency),
-        ("damping ratio ζ", "", |r| &r.damping_ratio),
-    ];
-    let parts = parts.iter().enumerate();
-    let parts = parts.filter(|(_, (_, _, part))| !part(found).is_empty());
+    let label = |ratio: Ratio| match ratio {
+        Ratio::StiffnessOverMass => ("k/m", "s⁻²"),
+        Ratio::DampingOverMass => ("c/m", "s⁻¹"),
+        Ratio::NaturalFrequency => ("natural frequency", "Hz"),
+        Ratio::DampingRatio => ("damping ratio ζ", ""),
+    };
+    let parts = Ratio::ALL.map(label).into_iter().enumerate();
+    let parts = parts.filter(|(i, _)| !found[*i].is_empty());
     Figure::new(
         "ratios",
         "Ratios of the coefficient functions",
         "Stiffness and damping over mass, natural frequency and damping ratio against time.",
     )
     .columns(2)
-    .panels(parts.map(|(i, (name, unit, part))| {
+    .panels(parts.map(|(i, (name, unit))| {
         let curve = FunctionCurve {
-            truth: truth.map(part),
+            truth: truth.map(|truth| truth[i].as_slice()),
             band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
-            ..FunctionCurve::new(name, unit, part(found))
+            ..FunctionCurve::new(name, unit, &found[i])
         };
         curve.panel(t)
     }))

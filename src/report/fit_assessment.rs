@@ -3,11 +3,11 @@
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
-    Doubt, EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals,
-    POOR, Parts, StepCheck, all_diagnostics,
+    Doubt, EquationErrorIntervals, EstimateErrors, FitAssessment, NoIntervals, POOR, Parts,
+    StepCheck, all_diagnostics,
 };
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
-use kmcfit_core::internals::identifiability::{Bands, Means};
+use kmcfit_core::internals::identifiability::{Bands, Quantities};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
@@ -15,7 +15,6 @@ use kmcfit_core::internals::solvers::{
     predict_validation,
 };
 use kmcfit_core::internals::step::SimulationError;
-use std::ops::Range;
 
 /// Assessment of a fit, computed once for all its documents.
 #[derive(Debug, Clone)]
@@ -83,25 +82,11 @@ impl RunAssessment {
         }
     }
 
-    /// Variances of the scalars with the indices `range` of a simulated response, if standard errors are meaningful.
-    pub(super) fn scalar_variances(&self, range: Range<usize>) -> Option<Vec<f64>> {
-        let assessment = self.assessment.as_ref()?;
-        match (&assessment.covariance, &assessment.large_covariance) {
-            (Some(covariance), _) => Some(range.map(|index| covariance[(index, index)]).collect()),
-            (None, large) => large.as_ref().map(|large| large.scalar_variances.clone()),
-        }
-    }
-
-    /// Covariance of more than 64 parameters, if standard errors are meaningful.
-    pub(super) fn large_covariance(&self) -> Option<&LargeCovariance> {
-        self.assessment.as_ref()?.large_covariance.as_ref()
-    }
-
-    /// Means over the record with their standard errors, where these are meaningful.
-    pub(super) fn means(&self) -> Option<Means<'_>> {
+    /// Means over the record and scalars with their standard errors, where these are meaningful.
+    pub(super) fn quantities(&self) -> Option<&Quantities> {
         match &self.assessment {
-            Some(assessment) => assessment.means(),
-            None => self.bands().map(Bands::means),
+            Some(assessment) => assessment.quantities(),
+            None => self.bands().map(|bands| &bands.quantities),
         }
     }
 

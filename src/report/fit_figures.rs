@@ -6,6 +6,7 @@ use super::document::ResultDocument;
 use super::figures::{self, FunctionCurve};
 use super::record_figures::{self, InputSeries};
 use super::tables::FUNCTION_ROWS;
+use kmcfit_core::internals::identifiability::{Band, Bands};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
 use kmcfit_core::internals::threads::{analyses_at_once, both, map};
@@ -292,9 +293,7 @@ impl FittedModel<'_> {
         let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
         let starts = problem.functions.values(&problem.start());
         let times = rows(&problem.system.grid.times());
-        let bands = self
-            .bands()
-            .map_or(Vec::new(), |b| b.curves(&b.functions, &times));
+        let bands = self.band_curves(|bands| &bands.functions, &times);
         let panels = self.named_functions().into_iter().enumerate();
         let panels = panels.map(|(i, (function, found))| {
             let name = format!("{} {}", function.name(), function.quantity.symbol());
@@ -316,6 +315,13 @@ impl FittedModel<'_> {
         figures::functions(panels)
     }
 
+    /// Ends of some bands at these times; none without bands.
+    fn band_curves(&self, of: fn(&Bands) -> &Vec<Band>, times: &[f64]) -> Vec<[Vec<f64>; 2]> {
+        let bands = self.bands().into_iter();
+        let curves = bands.flat_map(|b| of(b).iter().map(|band| band.curves(&b.times, times)));
+        curves.collect()
+    }
+
     /// The ratios, at the nodes that their table has.
     fn ratios_figure(&self) -> Figure {
         let found = self.ratio_rows(&self.fit.best.evaluation.nodal);
@@ -325,9 +331,7 @@ impl FittedModel<'_> {
             .as_ref()
             .map(|truth| self.ratio_rows(truth));
         let times = self.rows(&self.model.problem.system.grid.times(), FUNCTION_ROWS);
-        let bands = self
-            .bands()
-            .map_or(Vec::new(), |b| b.curves(&b.ratios, &times));
+        let bands = self.band_curves(|bands| &bands.ratios, &times);
         figures::ratios(&times, &found, truth.as_ref(), &bands)
     }
 }

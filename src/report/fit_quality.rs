@@ -1,14 +1,11 @@
 //! Fit quality in the result document: channels, nuisance parameters, validation records.
 
 use super::channel_view::{ChannelView, whiteness};
-use super::document::{
-    ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
-};
+use super::document::{ChannelSummary, IgnoredSummary, NoiseSummary, ValidationSummary};
 use super::fit_assessment::ValidationRecord;
 use kmcfit_core::internals::assessment::{outliers, pattern};
+use kmcfit_core::internals::identifiability::Quantities;
 use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Loss, Weighting};
 
 /// One channel with its predictions, and the samples between the rows of its table.
@@ -70,28 +67,6 @@ fn noise(correlation: &Correlation) -> NoiseSummary {
     }
 }
 
-/// The nuisance parameters of a problem at a point, with standard errors from their `variances` if available, and the degrees of freedom of
-/// all parameters.
-pub fn scalars(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    variances: Option<&[f64]>,
-    degrees: &[f64],
-) -> Vec<NuisanceParameter> {
-    let range = problem.functions.scalar_range();
-    let list = problem.functions.scalars().iter().zip(range);
-    let list = list.zip(&evaluation.scalars).enumerate();
-    list.map(|(place, ((scalar, index), value))| NuisanceParameter {
-        name: scalar.name.clone(),
-        unit: scalar.unit.clone(),
-        value: *value,
-        standard_error: variances.map(|variances| variances[place].sqrt()),
-        degrees_of_freedom: (degrees.get(index).copied())
-            .filter(|d| variances.is_some() && d.is_finite()),
-    })
-    .collect()
-}
-
 /// Summary of a validation record.
 pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     let channels = held.channels();
@@ -105,11 +80,17 @@ pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     match &held.found {
         Ok((problem, evaluation)) => {
             let covariance = problem.covariance(evaluation);
-            let range = problem.functions.scalar_range();
-            let variances = covariance.map(|c| range.map(|i| c[(i, i)]).collect::<Vec<f64>>());
             let degrees = problem.degrees_of_freedom(evaluation);
-            summary.nuisance_parameters =
-                scalars(problem, evaluation, variances.as_deref(), &degrees);
+            let scalars = Quantities::scalars_of(problem, &evaluation.scalars);
+            let range = problem.functions.scalar_range();
+            let each = scalars
+                .into_iter()
+                .zip(range)
+                .map(|(scalar, j)| match &covariance {
+                    Some(covariance) => scalar.with_covariance(covariance, degrees[j]),
+                    None => scalar,
+                });
+            summary.nuisance_parameters = each.collect();
         }
         Err(breakdown) => summary.failure = Some(breakdown.to_string()),
     }

@@ -6,7 +6,7 @@ use crate::config::{ChannelNote, Model};
 use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
+use kmcfit_core::internals::functions::{CoefficientFunction, Ratio};
 use kmcfit_core::internals::identifiability::{ScalingAmbiguity, Sensitivity, structural_rank};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::record::{Channel, Experiment};
@@ -128,9 +128,9 @@ fn start_values(model: &Model, evaluation: &Evaluation) -> String {
                 text.trim_end().to_owned()
             });
     let functions: Vec<String> = functions.collect();
-    let ratios = Ratios::of(&evaluation.nodal);
-    let [frequency, damping] =
-        [mean(&ratios.frequency), mean(&ratios.damping_ratio)].map(|x| significant(x, 4));
+    let mean = |ratio: Ratio| mean(&ratio.at_nodes(problem.system.laws(), &evaluation.nodal));
+    let ratios = [Ratio::NaturalFrequency, Ratio::DampingRatio].map(mean);
+    let [frequency, damping] = ratios.map(|x| significant(x, 4));
     format!(
         "start values: {}; natural frequency {frequency} Hz, damping ratio {damping}",
         functions.join(", ")

@@ -1,14 +1,12 @@
 //! `parameters.json`: all parameters of a fit with their covariance, so that every printed interval can be computed again.
 
 use super::document::{FORMAT, NoiseSummary, ResultDocument};
-use super::ratios;
 use super::run::FittedModel;
 use crate::error::InputError;
 use crate::text_io::{JSON, read_text_within};
-use kmcfit_core::internals::assessment::LargeCovariance;
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
-use kmcfit_core::internals::identifiability::{CovarianceKind, MeanOverRecord, Means};
+use kmcfit_core::internals::identifiability::{CovarianceKind, Quantity};
 use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
 use kmcfit_core::internals::record::{Channel, NoiseEstimate, ScoreCovariance};
 use serde::{Deserialize, Serialize};
@@ -183,9 +181,9 @@ impl FittedModel<'_> {
         let covariance = bands.and_then(|bands| bands.covariance.as_ref());
         let kind = bands
             .filter(|_| covariance.is_some())
-            .map(|bands| bands.covariance_kind);
+            .map(|bands| bands.quantities.kind);
         let estimates = match covariance.is_some() {
-            true => self.estimate_errors(document, &names),
+            true => self.estimate_errors(document, names.len()),
             false => BTreeMap::new(),
         };
         ParametersDocument {
@@ -230,61 +228,32 @@ impl FittedModel<'_> {
         bounds
     }
 
-    /// Mean of the estimate with this name.
-    fn mean<'a>(&self, means: &'a Means, name: &str) -> Option<&'a MeanOverRecord> {
-        let ratio = match name {
-            "natural_frequency" => "natural frequency",
-            "damping_ratio" => "damping ratio",
-            "k_over_m" => "k/m",
-            "c_over_m" => "c/m",
-            _ => {
-                let function = ratios::function_of(name);
-                let mut functions = self.model.problem.functions.iter();
-                let place = functions.position(|f| f.name() == function)?;
-                return means.functions.get(place).copied();
-            }
-        };
-        means.ratio(ratio)
-    }
-
-    /// Covariance of more than 64 parameters.
-    pub(super) fn large_covariance(&self) -> Option<&LargeCovariance> {
-        self.run_assessment.large_covariance()
-    }
-
     fn estimate_errors(
         &self,
         document: &ResultDocument,
-        names: &[String],
+        parameters: usize,
     ) -> BTreeMap<String, EstimateError> {
-        let mut errors = BTreeMap::new();
-        let error = |mean: &MeanOverRecord| EstimateError {
-            gradient: mean.gradient.clone(),
-            basis_error: mean.basis_error,
-            quantile: student_half_width(mean.degrees),
+        let estimates = document.estimates.0.iter();
+        let estimates = estimates.filter(|(_, estimate)| estimate.ci95.is_some());
+        let estimates =
+            estimates.filter_map(|(name, estimate)| Some((name, estimate.quantity.as_ref()?)));
+        let scalars = document.nuisance_parameters.iter();
+        let scalars = scalars.filter(|scalar| scalar.standard_error.is_finite());
+        let error = |quantity: &Quantity| {
+            let mut gradient = vec![0.0; parameters];
+            quantity
+                .gradient
+                .iter()
+                .for_each(|(j, slope)| gradient[*j] = *slope);
+            EstimateError {
+                gradient,
+                basis_error: quantity.basis_error,
+                quantile: student_half_width(quantity.degrees),
+            }
         };
-        let means = self.run_assessment.means();
-        for (name, estimate) in &document.estimates.0 {
-            let mean = means.as_ref().and_then(|means| self.mean(means, name));
-            if let (Some(mean), Some(_)) = (mean, estimate.ci95) {
-                errors.insert(name.clone(), error(mean));
-            }
-        }
-        for parameter in &document.nuisance_parameters {
-            let index = names.iter().position(|name| *name == parameter.name);
-            if let (Some(index), Some(_)) = (index, parameter.standard_error) {
-                let mut gradient = vec![0.0; names.len()];
-                gradient[index] = 1.0;
-                let degrees = parameter.degrees_of_freedom.unwrap_or(f64::INFINITY);
-                let error = EstimateError {
-                    gradient,
-                    basis_error: 0.0,
-                    quantile: student_half_width(degrees),
-                };
-                errors.insert(parameter.name.clone(), error);
-            }
-        }
-        errors
+        let all = estimates.chain(scalars.map(|scalar| (&scalar.name, scalar)));
+        all.map(|(name, quantity)| (name.clone(), error(quantity)))
+            .collect()
     }
 }
 

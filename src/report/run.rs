@@ -19,7 +19,7 @@ use crate::config::{ChannelNote, Model};
 use kmcfit_core::internals::assessment::Estimate;
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
 use kmcfit_core::internals::host::Instant;
-use kmcfit_core::internals::identifiability::Bands;
+use kmcfit_core::internals::identifiability::{Bands, Quantities};
 use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
@@ -217,7 +217,6 @@ impl FittedModel<'_> {
             constraints: self.constraint_summary(),
             identifiability,
             findings,
-            doubts: self.doubts(),
             weights: self.weight_summary(),
             penalties: self.penalty_summaries(),
             attempts: self.fit.attempts.iter().map(attempt_summary).collect(),
@@ -229,18 +228,10 @@ impl FittedModel<'_> {
                 .map(fit_quality::validation)
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
-                true => {
-                    let scalars = model.problem.functions.scalar_range();
-                    let variances = self.run_assessment.scalar_variances(scalars);
-                    let degrees = (self.run_assessment.assessment.as_ref())
-                        .map_or(&[][..], |a| &a.degrees_of_freedom);
-                    fit_quality::scalars(
-                        &model.problem,
-                        &fit.best.evaluation,
-                        variances.as_deref(),
-                        degrees,
-                    )
-                }
+                true => match self.run_assessment.quantities() {
+                    Some(quantities) => quantities.scalars.clone(),
+                    None => Quantities::scalars_of(&model.problem, &fit.best.evaluation.scalars),
+                },
                 false => Vec::new(),
             },
             statistics: (self.run_assessment.assessment.as_ref())

@@ -1,9 +1,7 @@
 //! Summary of a fit for the terminal.
 
 use super::answer::answer_table;
-use super::document::{
-    AttemptSummary, ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
-};
+use super::document::{AttemptSummary, ChannelSummary, PenaltySummary, Prediction, ResultDocument};
 use super::doubts;
 use super::equation::equation_residual;
 use super::extent::{extent, validation};
@@ -14,6 +12,7 @@ use crate::finding::Finding;
 use crate::number_format::{count, resolved, significant};
 use kmcfit_core::internals::assessment::ClassicalEstimate;
 use kmcfit_core::internals::functions::WeightRule;
+use kmcfit_core::internals::identifiability::Quantity;
 use std::fmt::Write;
 
 /// Width of the interval of a classical frequency, relative to it, beyond which it is not shown.
@@ -176,13 +175,13 @@ fn fit(document: &ResultDocument) -> Vec<String> {
 }
 
 /// Nuisance parameters with their intervals.
-pub(super) fn nuisance_parameters(parameters: &[NuisanceParameter]) -> Vec<String> {
-    let line = |parameter: &NuisanceParameter| {
+pub(super) fn nuisance_parameters(parameters: &[Quantity]) -> Vec<String> {
+    let line = |parameter: &Quantity| {
         let (name, unit) = (&parameter.name, &parameter.unit);
-        match parameter.half_width() {
-            Some(half) => {
-                let (low, high) = (parameter.value - half, parameter.value + half);
-                let [value, low, high] = resolved([parameter.value, low, high], half);
+        match parameter.interval() {
+            Some([low, high]) => {
+                let numbers = [parameter.value, low, high];
+                let [value, low, high] = resolved(numbers, parameter.half_width());
                 format!("{name} = {value} {unit} (95 % CI {low} to {high})")
             }
             None => format!("{name} = {} {unit}", significant(parameter.value, 6)),

@@ -3,7 +3,8 @@
 use super::FittedModel;
 use super::columns::{function_column, interval_columns, named_column};
 use super::csv::CsvTable;
-use kmcfit_core::internals::functions::Ratios;
+use super::figures::RatioCurves;
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::IterationRecord;
 use kmcfit_core::internals::system::NodalCoefficients;
@@ -89,15 +90,9 @@ impl FittedModel<'_> {
     }
 
     /// The ratios of nodal coefficients at the nodes that the table of the functions has.
-    pub(super) fn ratio_rows(&self, nodal: &NodalCoefficients) -> Ratios {
-        let all = Ratios::of(nodal);
-        let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
-        Ratios {
-            k_over_m: rows(&all.k_over_m),
-            c_over_m: rows(&all.c_over_m),
-            frequency: rows(&all.frequency),
-            damping_ratio: rows(&all.damping_ratio),
-        }
+    pub(super) fn ratio_rows(&self, nodal: &NodalCoefficients) -> RatioCurves {
+        let laws = self.model.problem.system.laws();
+        Ratio::ALL.map(|ratio| self.rows(&ratio.at_nodes(laws, nodal), FUNCTION_ROWS))
     }
 
     pub(super) fn functions_table(&self) -> CsvTable {
@@ -109,21 +104,17 @@ impl FittedModel<'_> {
         for (function, values) in self.named_functions() {
             table = table.column(function_column(function, is_rotation), rows(&values));
         }
-        let ratios = self.ratio_rows(coefficients);
-        table = table
-            .column("k_over_m_per_s2", ratios.k_over_m)
-            .column("c_over_m_per_s", ratios.c_over_m)
-            .column("natural_frequency_Hz", ratios.frequency)
-            .column("damping_ratio", ratios.damping_ratio);
+        for (ratio, values) in Ratio::ALL.into_iter().zip(self.ratio_rows(coefficients)) {
+            table = table.column(ratio.column(), values);
+        }
         if let Some(bands) = self.bands() {
-            for list in [&bands.functions, &bands.ratios] {
-                for (band, [low, high]) in list.iter().zip(bands.curves(list, &times)) {
-                    let Some(column) = named_column(&band.name, is_rotation) else {
-                        continue;
-                    };
-                    let [of_low, of_high] = interval_columns(&column);
-                    table = table.column(of_low, low).column(of_high, high);
-                }
+            for band in bands.functions.iter().chain(&bands.ratios) {
+                let Some(column) = named_column(&band.name, is_rotation) else {
+                    continue;
+                };
+                let [low, high] = band.curves(&bands.times, &times);
+                let [of_low, of_high] = interval_columns(&column);
+                table = table.column(of_low, low).column(of_high, high);
             }
         }
         if let Some(truth) = &self.model.truth {

@@ -13,6 +13,7 @@ use kmcfit_core::internals::assessment::{
     estimates, verdict_assumptions, verdict_reasons,
 };
 use kmcfit_core::internals::diagnostics::standard_deviation;
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::solvers::{EquationBalance, Status};
 
 impl FittedModel<'_> {
@@ -29,7 +30,7 @@ impl FittedModel<'_> {
         }
         // Codes in place of samples are no motion.
         let warnings = &self.model.warnings;
-        let has_codes = warnings.iter().any(|w| w.kind == "missing_codes");
+        let has_codes = self.model.missing_codes().next().is_some();
         let implausible = self.implausible().filter(|_| !has_codes);
         reasons.extend(implausible.map(Doubt::ImplausibleUnits));
         let balance = self.run_assessment.balance.as_ref();
@@ -64,15 +65,16 @@ impl FittedModel<'_> {
         };
         let mut reasons: Vec<Finding> = reasons.iter().map(in_words).collect();
         // What the fit shows as well has its own reason.
-        let is_new = |finding: &&Finding| match finding.kind.as_str() {
-            "two_modes" => !reasons.iter().any(|r| r.kind == "second_mode"),
-            "saturation" => !reasons
-                .iter()
-                .any(|r| r.kind == "saturation" && r.said("channel") == finding.said("channel")),
-            _ => true,
+        let is_shown = |of_data: &Doubt| {
+            let mut shown = reasons.iter().filter_map(|reason| reason.doubt.as_ref());
+            shown.any(|shown| match (shown, of_data) {
+                (Doubt::SecondMode { .. }, Doubt::SecondMode { .. }) => true,
+                _ => shown == of_data,
+            })
         };
         let of_data = warnings.iter().filter(|w| w.level >= Severity::Check);
-        let of_data: Vec<Finding> = of_data.filter(is_new).cloned().collect();
+        let of_data = of_data.filter(|w| !w.doubt.as_ref().is_some_and(is_shown));
+        let of_data: Vec<Finding> = of_data.cloned().collect();
         reasons.extend(of_data);
         reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level));
         let most = reasons.iter().map(|reason| reason.level).max();
@@ -232,7 +234,7 @@ impl FittedModel<'_> {
             return Vec::new();
         }
         let problem = &self.model.problem;
-        let mut found = estimates(problem, self.fit, self.run_assessment.means().as_ref());
+        let mut found = estimates(problem, self.fit, self.run_assessment.quantities());
         for ((_, estimate), function) in (found.iter_mut())
             .filter(|(name, _)| !is_ratio(name))
             .zip(problem.functions.iter())
@@ -267,10 +269,7 @@ fn of_balance(balance: &EquationBalance) -> Option<Doubt> {
 
 /// True for the ratios among the estimates.
 fn is_ratio(name: &str) -> bool {
-    matches!(
-        name,
-        "natural_frequency" | "damping_ratio" | "k_over_m" | "c_over_m"
-    )
+    Ratio::named(name).is_some()
 }
 
 /// An assumption of a verdict as a sentence.

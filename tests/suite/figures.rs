@@ -2,7 +2,6 @@
 
 use kmcfit::report::figures::{FunctionCurve, convergence, functions, ratios, response};
 use kmcfit::report::{Axis, Colour, Figure, Mark, Panel, Style, render};
-use kmcfit_core::internals::functions::Ratios;
 
 /// All standard figures, with one series for all quantities.
 fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
@@ -12,12 +11,7 @@ fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
         truth: Some(y),
         ..FunctionCurve::new("mass m", "kg", y)
     };
-    let found = Ratios {
-        k_over_m: y.to_vec(),
-        c_over_m: t.to_vec(),
-        frequency: y.to_vec(),
-        damping_ratio: y.to_vec(),
-    };
+    let found = [y, t, y, y].map(<[f64]>::to_vec);
     vec![
         convergence(t, y, t),
         response(t, y, &[(0, t, y), (10, t, t)]),
@@ -88,7 +82,7 @@ fn any_data_give_a_figure() {
 fn figures_without_content_are_documents_too() {
     check(&render(&Figure::new("", "", "")));
     check(&render(&functions([])));
-    check(&render(&ratios(&[], &Ratios::default(), None, &[])));
+    check(&render(&ratios(&[], &Default::default(), None, &[])));
     check(&render(&Figure::new("", "", "").columns(0).panel(
         Panel::new(
             Axis::linear("", "").limits(1.0, 1.0),

@@ -6,36 +6,32 @@ pub mod assessment {
         AmplitudeRival, BEYOND_SIGMA, BasisComparison, BasisTest, ClassicalEstimate,
         ClassicalMethod, CoarseBasis, Doubt, EXACT, EquationErrorIntervals, Estimate,
         EstimateErrors, EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics,
-        FunctionSummary, Implausible, LargeCovariance, ModelTests, NoIntervals, POOR, Parts,
-        Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Severity, StepCheck,
-        TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, all_diagnostics, estimates,
-        function_summaries, outliers, pattern, standard_error, verdict_assumptions,
-        verdict_reasons,
+        FunctionSummary, Implausible, ModelTests, NoIntervals, POOR, Parts, Plausibility,
+        RecordError, ResidualPattern, Severity, StepCheck, TruthErrors, Unidentified,
+        VerdictAssumption, VerdictLevel, all_diagnostics, estimates, function_summaries, outliers,
+        pattern, quantities_of_many, verdict_assumptions, verdict_reasons,
     };
 }
 pub mod builder {
     pub use crate::builder::{
-        BuildError, BuildNotice, Builder, ChannelSpec, Contradiction, Record, UNKNOWN_MASS,
-        WeightSearch, listed,
+        BuildError, Builder, ChannelSpec, Contradiction, Record, UNKNOWN_MASS, WeightSearch, listed,
     };
 }
 pub mod constraints {
     pub use crate::constraints::{
-        Cone, Constraint, ConstraintError, Constraints, RowGroup, Rows, Shape, TOLERANCE,
-        TimeHistory,
+        Cone, Constraint, Constraints, RowGroup, Rows, Shape, TOLERANCE, TimeHistory,
     };
 }
 pub mod diagnostics {
     pub use crate::diagnostics::{
-        ResidualDiagnostics, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult,
-        chi_square_one, detrended, normal_half_width, offset_and_drift, outlier_indices, rms,
-        standard_deviation, student_half_width,
+        ResidualDiagnostics, SIGNIFICANCE, Whiteness, chi_square_one, detrended, normal_half_width,
+        offset_and_drift, outlier_indices, rms, standard_deviation, student_half_width,
     };
 }
 pub mod functions {
     pub use crate::functions::{
-        Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Gram, Parameterization,
-        Penalty, Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
+        Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization, Penalty,
+        Prior, Ratio, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
     };
 }
 pub mod host {
@@ -43,27 +39,27 @@ pub mod host {
 }
 pub mod identifiability {
     pub use crate::identifiability::{
-        Band, BandSide, Bands, Classification, ClassificationKind, Condition, CovarianceKind,
-        FunctionClassification, Gain, MeanOverRecord, Means, RankFinding, Ranked, RelativeChange,
-        ScaleFreedom, ScaleSource, ScalingAmbiguity, Sensitivity, SingularSpectrum,
-        classify_functions, is_negligible, rank_experiments, scale_source, structural_rank,
+        Band, Bands, Classification, ClassificationKind, Condition, CovarianceKind, Curve,
+        FunctionClassification, Quantities, Quantity, RankFinding, Ranked, ScaleFreedom,
+        ScaleSource, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Target,
+        classify_functions, rank_experiments, scale_source, structural_rank,
     };
     pub use crate::spans::span_words;
 }
 pub mod objective {
-    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord, state_scales};
+    pub use crate::objective::{Evaluation, GradientKind, SimulatedRecord};
 }
 pub mod problem {
-    pub use crate::problem::{Jumps, Problem, ProblemError, ProblemParts};
+    pub use crate::problem::{Jumps, Problem};
 }
 pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
 }
 pub mod noise {
-    pub use crate::noise::{Autoregression, Correlation, CorrelationLaw, automatic_bandwidth};
+    pub use crate::noise::{Correlation, CorrelationLaw, automatic_bandwidth};
 }
 pub mod number_format {
-    pub use crate::number_format::{at_most, significant};
+    pub use crate::number_format::{at_most, number_or_nan, significant};
 }
 pub mod record {
     pub use crate::record::{
@@ -74,7 +70,7 @@ pub mod record {
 pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Extremes, Interpolation, Mobility, SecondOrder, Signal, Spectrum,
-        SweepLaw, band_pass, clipped, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
+        SweepLaw, band_pass, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
         high_pass, is_kept_up, jumps, low_pass, median, median_spacing, onset, quantisation,
         spikes, two_forced_modes, two_modes,
     };
@@ -91,24 +87,23 @@ pub mod step {
 pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
-        ActiveGroup, Attempt, BoundedValue, ConditionFailure, EquationBalance, EquationForm,
-        EquationShare, Fit, FitSettings, GridNotice, Initial, IterationEvent, IterationRecord,
-        Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes, Optimality, PathPoint,
-        QpSolver, Reason, Solver, StartProjection, StartStrategy, Status, Stopping,
-        UnsupportedRecord, WeightPath, active_constraints, choose_weight, choose_weight_watched,
+        ActiveGroup, Attempt, EquationBalance, EquationForm, EquationShare, Fit, FitSettings,
+        GridNotice, Initial, IterationEvent, IterationRecord, Measurements, MissingTerm, Observer,
+        OnNodes, Optimality, PathPoint, QpSolver, Solver, StartProjection, StartStrategy, Status,
+        Stopping, WeightPath, active_constraints, choose_weight, choose_weight_watched,
         equation_balance, equation_error, equation_rows, fit, fit_from, fit_on_refined_grids,
-        fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
-        predict_validation, timed,
+        fit_with_noise, fit_with_noise_watched, missing_terms, no_response, predict_validation,
+        timed,
     };
 }
 pub mod structure {
-    pub use crate::structure::{CoefficientRow, Ends, Law, Structure};
+    pub use crate::structure::{Ends, Law, Structure};
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, IdentifiedSystem, Linear, PredictedChannel, PredictedResponse,
-        PredictionSummary, Profile, ProfileSettings, Target, equivalent_coefficients,
-        equivalent_systems, extremes, multistart, predict, prediction, profile, profile_likelihood,
+        Choice, EquivalentSystem, IdentifiedSystem, PredictedChannel, PredictedResponse,
+        PredictionSummary, Profile, ProfileSettings, equivalent_coefficients, equivalent_systems,
+        extremes, multistart, predict, prediction, profile, profile_likelihood,
     };
 }
 pub mod system {
@@ -119,7 +114,6 @@ pub mod system {
 }
 pub mod threads {
     pub use crate::threads::{
-        analyses_at_once, available, available_for, both, interruptible, map, share, sharing,
-        spawn_scoped,
+        analyses_at_once, available, available_for, both, interruptible, map, sharing,
     };
 }

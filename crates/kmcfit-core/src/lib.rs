@@ -89,7 +89,7 @@ mod threads;
 // Problems.
 pub use builder::{BuildError, Builder, ChannelSpec, Record};
 pub use constraints::{Constraint, Shape, TimeHistory};
-pub use functions::{CoefficientKind, Prior, WeightRule};
+pub use functions::{CoefficientKind, Prior, Ratio, WeightRule};
 pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, InputNoiseKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
@@ -108,8 +108,10 @@ pub use solvers::{
 };
 // Inference.
 pub use assessment::{CoarseBasis, Doubt, FitAssessment, Unidentified};
-pub use identifiability::{Bands, classify_functions, structural_rank};
-pub use study::{Profile, ProfileSettings, Target, profile};
+pub use identifiability::{
+    Bands, Curve, Quantities, Quantity, Target, classify_functions, structural_rank,
+};
+pub use study::{Profile, ProfileSettings, profile};
 // Services of the host.
 pub use host::{Host, set_host};
 

@@ -1,5 +1,7 @@
 //! Numbers as people write them in a sentence.
 
+use serde::{Deserialize, Deserializer};
+
 /// A number with `digits` significant digits, without trailing zeros; very small and very large numbers in powers of
 /// ten.
 pub fn significant(x: f64, digits: usize) -> String {
@@ -26,6 +28,11 @@ pub fn at_most(x: f64, digits: usize) -> String {
         }
         false => significant(up, digits),
     }
+}
+
+/// Reads a number; NaN for JSON's `null`, which stands for numbers that are not finite.
+pub fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 #[cfg(test)]

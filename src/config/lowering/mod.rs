@@ -17,7 +17,7 @@ pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 use place::Place;
 pub use refinement::AutomaticGrid;
-pub use study::{StudyPlan, StudyTarget};
+pub use study::StudyPlan;
 
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
@@ -90,6 +90,15 @@ impl Model {
             let mut warnings = self.warnings.iter();
             warnings.any(|w| w.kind == "unmeasured_force" && is_of(w))
         })
+    }
+
+    /// Values that stand for missing samples and are not stated, with the names of the experiments.
+    pub fn missing_codes(&self) -> impl Iterator<Item = (String, &serde_json::Value)> {
+        let found = self
+            .warnings
+            .iter()
+            .filter(|w| w.kind == experiments::MISSING_CODES);
+        found.filter_map(|w| Some((w.said("experiment")?, w.quantities.get("codes")?)))
     }
 }
 

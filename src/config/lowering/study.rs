@@ -8,6 +8,7 @@ use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::{Curve, Target};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
@@ -24,7 +25,7 @@ pub struct StudyPlan {
     /// Seed of everything random.
     pub seed: u64,
     /// Quantities with a profile likelihood.
-    pub profiles: Vec<StudyTarget>,
+    pub profiles: Vec<Target>,
     /// Times of the extremes, s.
     pub extremes: Vec<f64>,
     /// Largest cost J of the extremes; `None` for the limit from the confidence level.
@@ -49,28 +50,6 @@ impl StudyPlan {
         let asked = [!self.candidates.is_empty(), self.starts > 0];
         always + self.profiles.len() + asked.into_iter().filter(|asked| *asked).count()
     }
-}
-
-/// Target of a profile.
-#[derive(Debug, Clone, PartialEq)]
-pub enum StudyTarget {
-    /// Value of a function at a time.
-    Value {
-        /// Index of the function.
-        function: usize,
-        /// Time, s.
-        time: f64,
-    },
-    /// Mean of a function over the record.
-    Mean {
-        /// Index of the function.
-        function: usize,
-    },
-    /// A nuisance parameter.
-    Scalar {
-        /// Index of the parameter.
-        index: usize,
-    },
 }
 
 const CONFIDENCE: f64 = 0.95;
@@ -244,11 +223,7 @@ fn on_grid(at: &Place<'_>, problem: &Problem, time: f64) -> Result<(), InputErro
     }
 }
 
-fn target(
-    at: &Place<'_>,
-    problem: &Problem,
-    spec: &ProfileSpec,
-) -> Result<StudyTarget, InputError> {
+fn target(at: &Place<'_>, problem: &Problem, spec: &ProfileSpec) -> Result<Target, InputError> {
     let mean = spec.mean == Some(true);
     match (spec.function, &spec.parameter) {
         (Some(name), None) => {
@@ -256,11 +231,11 @@ fn target(
             match (spec.at, mean) {
                 (Some(time), false) => {
                     on_grid(&at.below("at"), problem, time)?;
-                    Ok(StudyTarget::Value { function, time })
+                    Ok(Target::Value(Curve::Function(function), time))
                 }
-                (None, true) => Ok(StudyTarget::Mean { function }),
+                (None, true) => Ok(Target::Mean(Curve::Function(function))),
                 (None, false) if problem.functions.get(function).parameters() == 1 => {
-                    Ok(StudyTarget::Mean { function })
+                    Ok(Target::Mean(Curve::Function(function)))
                 }
                 _ => Err(at
                     .error("a profile needs one quantity")
@@ -270,22 +245,20 @@ fn target(
         (None, Some(name)) => {
             let scalars = problem.functions.scalars();
             let found = scalars.iter().position(|s| s.name == *name);
-            found
-                .map(|index| StudyTarget::Scalar { index })
-                .ok_or_else(|| {
-                    let names = || scalars.iter().map(|s| s.name.as_str());
-                    let error = at
-                        .error_in("parameter", "no such nuisance parameter")
-                        .found(quote(name))
-                        .expected(match scalars.is_empty() {
-                            true => "a model that estimates initial states or sensors".to_owned(),
-                            false => one_of(names()),
-                        });
-                    match did_you_mean(name, names()) {
-                        Some(hint) => error.hint(hint),
-                        None => error,
-                    }
-                })
+            found.map(Target::Scalar).ok_or_else(|| {
+                let names = || scalars.iter().map(|s| s.name.as_str());
+                let error = at
+                    .error_in("parameter", "no such nuisance parameter")
+                    .found(quote(name))
+                    .expected(match scalars.is_empty() {
+                        true => "a model that estimates initial states or sensors".to_owned(),
+                        false => one_of(names()),
+                    });
+                match did_you_mean(name, names()) {
+                    Some(hint) => error.hint(hint),
+                    None => error,
+                }
+            })
         }
         _ => Err(at
             .error("a profile needs one quantity")

@@ -3,7 +3,8 @@
 use super::ComparedRun;
 use crate::report::chart::{Colour, Dash, Figure, Mark, Panel, Style};
 use crate::report::{ResultTable, Run};
-use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::functions::Ratio;
+use kmcfit_core::internals::structure::Law;
 use kmcfit_core::internals::system::NodalCoefficients;
 
 /// The figures of a comparison.
@@ -19,19 +20,23 @@ fn style(index: usize) -> Style {
     Style::new(colour).dash(dash).width(1.6)
 }
 
-/// A quantity of each system: caption, unit, values.
-type Quantity = (
+/// A curve of each system: caption, unit, values.
+type ComparedCurve = (
     &'static str,
     &'static str,
-    fn(&NodalCoefficients) -> Vec<f64>,
+    fn(&[Law], &NodalCoefficients) -> Vec<f64>,
 );
 
-const QUANTITIES: [Quantity; 5] = [
-    ("mass m", "kg", |d| d.inertias[0].clone()),
-    ("damping c", "N s/m", |d| d.coefficients[0].clone()),
-    ("stiffness k", "N/m", |d| d.coefficients[1].clone()),
-    ("k/m", "s⁻²", |d| Ratios::of(d).k_over_m),
-    ("c/m", "s⁻¹", |d| Ratios::of(d).c_over_m),
+const CURVES: [ComparedCurve; 5] = [
+    ("mass m", "kg", |_, d| d.inertias[0].clone()),
+    ("damping c", "N s/m", |_, d| d.coefficients[0].clone()),
+    ("stiffness k", "N/m", |_, d| d.coefficients[1].clone()),
+    ("k/m", "s⁻²", |laws, d| {
+        Ratio::StiffnessOverMass.at_nodes(laws, d)
+    }),
+    ("c/m", "s⁻¹", |laws, d| {
+        Ratio::DampingOverMass.at_nodes(laws, d)
+    }),
 ];
 
 /// Coefficients and ratios of each run; `None` where all are constant.
@@ -43,19 +48,22 @@ fn functions(runs: &[ComparedRun]) -> Option<Figure> {
          the ratios only.",
     );
     figure
-        .panels(QUANTITIES.iter().map(|q| overlay(runs, q)))
+        .panels(CURVES.iter().map(|curve| overlay(runs, curve)))
         .varying()
 }
 
-fn overlay(runs: &[ComparedRun], (label, unit, of): &Quantity) -> Panel {
+fn overlay(runs: &[ComparedRun], (label, unit, of): &ComparedCurve) -> Panel {
     let times = |run: &ComparedRun| run.finished.system.grid.times();
     let found: Vec<Vec<f64>> = runs
         .iter()
-        .map(|run| of(&run.finished.coefficients))
+        .map(|run| of(run.finished.system.laws(), &run.finished.coefficients))
         .collect();
-    let real = runs
-        .iter()
-        .find_map(|run| Some((run, of(run.finished.truth.as_ref()?))));
+    let real = runs.iter().find_map(|run| {
+        Some((
+            run,
+            of(run.finished.system.laws(), run.finished.truth.as_ref()?),
+        ))
+    });
     let thick = Style::new(Colour::Grey).width(5.0);
     let truth = real.map(|(run, y)| Mark::line("truth", &times(run), &y, thick));
     let name = label.split(' ').next().unwrap_or(label);

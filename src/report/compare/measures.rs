@@ -89,7 +89,8 @@ impl Measures {
             bic_difference: None,
             natural_frequency: document.estimates.get("natural_frequency").cloned(),
             damping_ratio: document.estimates.get("damping_ratio").cloned(),
-            errors: (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(coefficients, truth)),
+            errors: (run.finished.truth.as_ref())
+                .map(|truth| TruthErrors::of(run.finished.system.laws(), coefficients, truth)),
             seconds: document.seconds,
             assumptions: document.identifiability.assumptions.clone(),
         }

@@ -1,9 +1,9 @@
-//! Channels, nuisance parameters and validation records in the result document.
+//! Channels and validation records in the result document.
 
 use super::{is_one, one};
 use kmcfit_core::internals::assessment::ResidualPattern;
-use kmcfit_core::internals::diagnostics::student_half_width;
-use kmcfit_core::internals::solvers::number_or_nan;
+use kmcfit_core::internals::identifiability::Quantity;
+use kmcfit_core::internals::number_format::number_or_nan;
 use serde::{Deserialize, Serialize};
 
 /// One channel of an experiment at the best point, in its own unit.
@@ -91,33 +91,6 @@ pub struct IgnoredSummary {
     pub reason: String,
 }
 
-/// A nuisance parameter: an estimated initial value or sensor parameter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NuisanceParameter {
-    /// Name.
-    pub name: String,
-    /// SI unit.
-    pub unit: String,
-    /// Estimate.
-    #[serde(deserialize_with = "number_or_nan")]
-    pub value: f64,
-    /// Standard error from the linearised fit, without constraints, penalties and priors; `null` if the samples do not
-    /// determine all parameters.
-    pub standard_error: Option<f64>,
-    /// Degrees of freedom of the t distribution of the estimate, where the noise was estimated with it; the normal distribution
-    /// otherwise.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub degrees_of_freedom: Option<f64>,
-}
-
-impl NuisanceParameter {
-    /// Half-width of the 95 % interval, where there is a standard error.
-    pub fn half_width(&self) -> Option<f64> {
-        let degrees = self.degrees_of_freedom.unwrap_or(f64::INFINITY);
-        Some(self.standard_error? * student_half_width(degrees))
-    }
-}
-
 /// A validation record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ValidationSummary {
@@ -127,7 +100,7 @@ pub struct ValidationSummary {
     pub channels: Vec<ChannelSummary>,
     /// Parameters estimated from its own samples: initial state, sensors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub nuisance_parameters: Vec<NuisanceParameter>,
+    pub nuisance_parameters: Vec<Quantity>,
     /// Reason for a missing prediction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,

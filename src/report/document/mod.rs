@@ -5,9 +5,7 @@ mod estimates;
 mod fit_summaries;
 mod verdict;
 
-pub use channel::{
-    ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
-};
+pub use channel::{ChannelSummary, IgnoredSummary, NoiseSummary, ValidationSummary};
 pub use estimates::Estimates;
 pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
 pub use verdict::{Verdict, level_in_words};
@@ -20,9 +18,9 @@ use kmcfit_core::internals::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::ClassificationKind;
-use kmcfit_core::internals::identifiability::CovarianceKind;
-use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status, number_or_nan};
+use kmcfit_core::internals::identifiability::{ClassificationKind, CovarianceKind, Quantity};
+use kmcfit_core::internals::number_format::number_or_nan;
+use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status};
 pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
@@ -48,9 +46,6 @@ pub struct ResultDocument {
     /// confidence intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
-    /// The doubts among them, for advice; not in the file.
-    #[serde(skip)]
-    pub(super) doubts: Vec<Doubt>,
     /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
     #[serde(default, skip_serializing_if = "Estimates::is_empty")]
     pub estimates: Estimates,
@@ -100,7 +95,7 @@ pub struct ResultDocument {
     pub validation: Vec<ValidationSummary>,
     /// Estimated initial states and sensor parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub nuisance_parameters: Vec<NuisanceParameter>,
+    pub nuisance_parameters: Vec<Quantity>,
     /// Statistics of all samples.
     #[serde(default)]
     pub statistics: FitStatistics,
@@ -330,8 +325,21 @@ impl ResultDocument {
 
     /// True where the fit or the data show two modes.
     pub(super) fn has_two_modes(&self) -> bool {
-        let mut reasons = self.verdict.iter().flat_map(|verdict| &verdict.reasons);
-        reasons.any(|reason| matches!(reason.kind.as_str(), "second_mode" | "two_modes"))
+        self.reasons()
+            .any(|reason| matches!(reason, Doubt::SecondMode { .. }))
+    }
+
+    /// The doubts among the findings of a fit of this process; a file has their sentences alone.
+    pub(super) fn doubts(&self) -> impl Iterator<Item = &Doubt> {
+        self.findings
+            .iter()
+            .filter_map(|finding| finding.doubt.as_ref())
+    }
+
+    /// The doubts among the reasons of the verdict, as [`ResultDocument::doubts`].
+    pub(crate) fn reasons(&self) -> impl Iterator<Item = &Doubt> {
+        let reasons = self.verdict.iter().flat_map(|verdict| &verdict.reasons);
+        reasons.filter_map(|reason| reason.doubt.as_ref())
     }
 
     /// True if a previous fit estimated the standard deviation of a channel, which changes the cost of the last one.

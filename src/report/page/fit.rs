@@ -9,11 +9,12 @@ use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::report::FittedModel;
 use crate::report::chart::Figure;
-use crate::report::document::{NuisanceParameter, ResultDocument};
+use crate::report::document::ResultDocument;
 use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
 use crate::report::summary;
-use crate::units::{Quantity, Unit};
+use crate::units::{self, Unit};
+use kmcfit_core::internals::identifiability::Quantity;
 
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {
@@ -206,7 +207,7 @@ fn predictions(document: &ResultDocument) -> String {
 }
 
 /// The nuisance parameters in the units of the channels of their quantity, where these have one unit.
-fn in_shown_units(document: &ResultDocument) -> Vec<NuisanceParameter> {
+fn in_shown_units(document: &ResultDocument) -> Vec<Quantity> {
     let unit_of = |kind: &str| {
         let mut units = document
             .channels()
@@ -217,10 +218,10 @@ fn in_shown_units(document: &ResultDocument) -> Vec<NuisanceParameter> {
     };
     let displacement = unit_of("displacement");
     let velocity = unit_of("velocity").or(displacement.as_ref().map(|unit| format!("{unit}/s")));
-    let shown = |parameter: &NuisanceParameter| {
+    let shown = |parameter: &Quantity| {
         let (quantity, unit) = match parameter.unit.as_str() {
-            "m" | "rad" => (Quantity::Displacement, displacement.as_ref()?),
-            "m/s" | "rad/s" => (Quantity::Velocity, velocity.as_ref()?),
+            "m" | "rad" => (units::Quantity::Displacement, displacement.as_ref()?),
+            "m/s" | "rad/s" => (units::Quantity::Velocity, velocity.as_ref()?),
             _ => return None,
         };
         Unit::recognise(quantity, unit).filter(|unit| !unit.is_arbitrary())
@@ -228,10 +229,10 @@ fn in_shown_units(document: &ResultDocument) -> Vec<NuisanceParameter> {
     let each = document.nuisance_parameters.iter();
     each.map(|parameter| match shown(parameter) {
         None => parameter.clone(),
-        Some(unit) => NuisanceParameter {
+        Some(unit) => Quantity {
             unit: unit.symbol().to_owned(),
             value: parameter.value / unit.factor(),
-            standard_error: parameter.standard_error.map(|error| error / unit.factor()),
+            standard_error: parameter.standard_error / unit.factor(),
             ..parameter.clone()
         },
     })

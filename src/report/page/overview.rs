@@ -6,7 +6,7 @@ use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::text::prose;
 use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;
 
@@ -75,11 +75,11 @@ pub(super) fn ratios_of_records(run: &FittedModel) -> String {
     let mean = |values: &[f64]| number(values.iter().sum::<f64>() / values.len().max(1) as f64);
     let rows = problem.experiments.iter().map(|experiment| {
         let nodal = run.fit.best.evaluation.nodal_of(experiment.coefficient_set);
-        let ratios = Ratios::of(nodal);
+        let mean = |ratio: Ratio| mean(&ratio.at_nodes(problem.system.laws(), nodal));
         vec![
             experiment.name.clone(),
-            format!("{} Hz", mean(&ratios.frequency)),
-            mean(&ratios.damping_ratio),
+            format!("{} Hz", mean(Ratio::NaturalFrequency)),
+            mean(Ratio::DampingRatio),
         ]
     });
     let headings = ["record", "undamped natural frequency", "damping ratio"];

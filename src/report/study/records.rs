@@ -1,12 +1,12 @@
 //! Records of a study from the analyses of the core.
 
 use super::document::*;
-use crate::config::{Model, StudyTarget};
+use crate::config::Model;
 use crate::finding::Finding;
 use crate::report::findings;
 use kmcfit_core::internals::diagnostics::chi_square_one;
 use kmcfit_core::internals::identifiability::{
-    self, ScalingAmbiguity, Sensitivity, rank_experiments,
+    self, ScalingAmbiguity, Sensitivity, Target, rank_experiments,
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -15,7 +15,7 @@ use kmcfit_core::internals::study::extremes::{Extreme, MisfitLimit, envelopes};
 use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
 use kmcfit_core::internals::study::profile_likelihood::{Interval, ProfileSettings};
 use kmcfit_core::internals::study::{
-    Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
+    Choice, EquivalentSystem, equivalent_systems, prediction, profile,
 };
 
 /// Most unidentifiable combinations in the document.
@@ -66,20 +66,11 @@ pub fn sensitivity(at: Optimum) -> SensitivityRecord {
     }
 }
 
-/// The linear functional of a target.
-pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
-    match target {
-        StudyTarget::Value { function, time } => Linear::value(problem, *function, *time),
-        StudyTarget::Mean { function } => Some(Linear::mean(problem, *function)),
-        StudyTarget::Scalar { index } => Some(Linear::scalar(problem, *index)),
-    }
-}
-
 /// Likelihood profile of one quantity.
 ///
 /// # Errors
 /// The reason for which there is none.
-pub fn profile_of(at: Optimum, of: &Linear, model: &Model) -> Result<ProfileRecord, String> {
+pub fn profile_of(at: Optimum, of: &Target, model: &Model) -> Result<ProfileRecord, String> {
     let how = ProfileSettings {
         quantile: chi_square_one(model.study.confidence),
         ..ProfileSettings::default()

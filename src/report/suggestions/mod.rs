@@ -142,7 +142,7 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
 
 /// True if the fit has such a doubt.
 fn has(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> bool {
-    document.doubts.iter().any(is_meant)
+    document.doubts().any(is_meant)
 }
 
 /// The suggestions as advice without trials, where the model file is not at hand.
@@ -185,14 +185,11 @@ fn written(value: f64) -> String {
 
 /// Statement of the codes that stand for missing samples.
 fn about_codes(model: &Model) -> Option<Suggestion> {
-    let found = model.warnings.iter().filter(|w| w.kind == "missing_codes");
-    let overrides = found.filter_map(|warning| {
-        let name = warning.said("experiment")?;
+    let overrides = model.missing_codes().filter_map(|(name, codes)| {
         let mut experiments = model.problem.experiments.iter();
         let i = model
             .places
             .get(experiments.position(|e| e.name == name)?)?;
-        let codes = warning.quantities.get("codes")?;
         Some(format!("experiments.{i}.missing={codes}"))
     });
     let overrides: Vec<String> = overrides.collect();
@@ -274,7 +271,7 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
 
 /// The sensor with the most significant mean of its residuals.
 fn about_means(document: &ResultDocument) -> Option<Suggestion> {
-    let means = document.doubts.iter().filter_map(|doubt| match doubt {
+    let means = document.doubts().filter_map(|doubt| match doubt {
         Doubt::ResidualMean {
             experiment,
             channel,

@@ -37,7 +37,7 @@ fn sampled_input(model: &Model, i: usize) -> Option<(&'static str, &Signal)> {
 
 /// Correction of an error of a record.
 pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
-    let errors = document.doubts.iter().filter_map(|doubt| match doubt {
+    let errors = document.doubts().filter_map(|doubt| match doubt {
         Doubt::RecordError(error) => Some(error),
         _ => None,
     });
@@ -127,7 +127,7 @@ fn about_delay(document: &ResultDocument, experiment: &str, samples: f64) -> Opt
 
 /// Noise of the sensor of an input, with cubics where lines connect its samples, as these lose a share of it.
 pub(super) fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
-    let disturbed = document.doubts.iter().find_map(|doubt| match doubt {
+    let disturbed = document.doubts().find_map(|doubt| match doubt {
         Doubt::DisturbedInput {
             experiment,
             input,
@@ -138,7 +138,7 @@ pub(super) fn about_disturbance(document: &ResultDocument, model: &Model) -> Opt
     });
     let (experiment, name, sigma) = disturbed?;
     let is_held = |signal: &Signal| signal.interpolation() == Interpolation::Hold;
-    let jump = document.doubts.iter().find_map(|doubt| match doubt {
+    let jump = document.doubts().find_map(|doubt| match doubt {
         Doubt::RecordError(RecordError::InputJump { experiment, .. }) => Some(experiment),
         _ => None,
     });
@@ -163,7 +163,7 @@ pub(super) fn about_disturbance(document: &ResultDocument, model: &Model) -> Opt
 
 /// Cubic interpolation of a force, which loses less.
 pub(super) fn about_interpolation(document: &ResultDocument) -> Option<Suggestion> {
-    let loss = document.doubts.iter().find_map(|doubt| match doubt {
+    let loss = document.doubts().find_map(|doubt| match doubt {
         Doubt::InterpolationLoss {
             experiment, input, ..
         } => Some((experiment, *input)),

@@ -31,7 +31,7 @@ pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
         return Some(of_pattern(document, channel, &pattern));
     }
     let fit = document.worst_fit().unwrap_or(100.0);
-    let times = document.doubts.iter().find_map(|doubt| match doubt {
+    let times = document.doubts().find_map(|doubt| match doubt {
         Doubt::BeyondSigma { times } => Some(*times),
         _ => None,
     })?;

@@ -9,7 +9,7 @@ const WIDTH_SHIFT: f64 = 0.06;
 
 /// The most significant missing term of an equation of motion.
 pub(super) fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
-    let missing = document.doubts.iter().find_map(|doubt| match doubt {
+    let missing = document.doubts().find_map(|doubt| match doubt {
         Doubt::MissingTerm(missing) => Some(missing),
         _ => None,
     })?;
@@ -30,7 +30,7 @@ pub(super) fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
 
 /// A better width of Coulomb friction: the shift of the estimates is at most proportional to it.
 pub(super) fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
-    let depends = document.doubts.iter().find_map(|doubt| match doubt {
+    let depends = document.doubts().find_map(|doubt| match doubt {
         Doubt::FrictionWidth {
             width,
             better,

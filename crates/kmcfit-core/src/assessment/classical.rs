@@ -11,8 +11,8 @@
 //! of 95 % include the frequency spacing of the spectra, the width of their window, and the scatter of the mobility, but no nonlinearity.
 
 use crate::diagnostics::{NORMAL_975, student_half_width};
-use crate::functions::Ratios;
-use crate::identifiability::Bands;
+use crate::functions::Ratio;
+use crate::identifiability::{Bands, Quantity};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Waveform};
@@ -77,21 +77,20 @@ pub(super) fn classical_estimate(
     let set = functions.coefficient_set(0);
     let is_constant = set.iter().all(|f| functions.is_constant_or_known(*f));
     let is_linear = problem.system.laws() == [Law::Damping, Law::Stiffness];
-    let ratios = Ratios::of(&evaluation.nodal);
+    let at_nodes = |ratio: Ratio| ratio.at_nodes(problem.system.laws(), &evaluation.nodal);
+    let [natural, ratio] = [Ratio::NaturalFrequency, Ratio::DampingRatio].map(at_nodes);
     is_linear.then_some(())?;
     let is_steady = |values: &[f64]| values.iter().all(|v| *v == values[0]);
-    let is_constant =
-        is_constant && is_steady(&ratios.frequency) && is_steady(&ratios.damping_ratio);
+    let is_constant = is_constant && is_steady(&natural) && is_steady(&ratio);
     let each = problem.experiments.iter().zip(&evaluation.predictions);
     let mut each = each.filter(|(experiment, _)| {
         experiment.coefficient_set == 0 && (is_constant || experiment.is_free())
     });
     let mut found =
         each.find_map(|(experiment, predictions)| of_experiment(experiment, predictions.first()?))?;
-    let interval = |name: &str, values: &[f64]| {
-        let interval = bands
-            .and_then(|b| b.ratio(name))
-            .and_then(|b| b.mean.interval());
+    let interval = |ratio: Ratio, values: &[f64]| {
+        let mean = bands.and_then(|bands| bands.quantities.ratio(ratio));
+        let interval = mean.and_then(Quantity::interval);
         let range = values
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |r, x| {
@@ -102,9 +101,9 @@ pub(super) fn classical_estimate(
     };
     let is_near =
         |[a, b]: [f64; 2], [c, d]: [f64; 2]| (a + b - c - d).abs() <= (b - a).hypot(d - c);
-    let frequency = interval("natural frequency", &ratios.frequency);
-    let [low, high] = interval("damping ratio", &ratios.damping_ratio);
-    let adiabatic = adiabatic_ratio(evaluation, problem.system.grid.duration());
+    let frequency = interval(Ratio::NaturalFrequency, &natural);
+    let [low, high] = interval(Ratio::DampingRatio, &ratio);
+    let adiabatic = adiabatic_ratio(&natural, problem.system.grid.duration());
     let margin = 0.5 * adiabatic.abs();
     let damping = [low + adiabatic - margin, high + adiabatic + margin];
     found.agrees = is_near(found.frequency_interval, frequency)
@@ -115,13 +114,12 @@ pub(super) fn classical_estimate(
 }
 
 /// Mean damping ratio that a change of the natural frequency over a record adds to that of a decay.
-fn adiabatic_ratio(evaluation: &Evaluation, duration: f64) -> f64 {
-    let frequency = Ratios::of(&evaluation.nodal).frequency;
+fn adiabatic_ratio(frequency: &[f64], duration: f64) -> f64 {
     let part = (frequency.len() / ENDS).max(1);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let at = |from: usize| mean(&frequency[from..from + part]).ln();
     let change = 0.5 * (at(frequency.len() - part) - at(0));
-    let ratio = change / (TAU * mean(&frequency) * duration);
+    let ratio = change / (TAU * mean(frequency) * duration);
     if ratio.is_finite() { ratio } else { 0.0 }
 }
 

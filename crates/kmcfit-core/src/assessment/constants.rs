@@ -1,21 +1,10 @@
-//! Standard error of a constant function, and Wald test of a constant against a varying function.
+//! Wald test of a constant against a varying function.
 
-use crate::functions::{Basis, CoefficientFunction};
+use crate::functions::Basis;
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, Weighting};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
-
-/// Standard error of a constant function.
-pub fn standard_error(
-    function: &CoefficientFunction,
-    index: usize,
-    covariance: Option<&DMatrix<f64>>,
-) -> Option<f64> {
-    let constant = matches!(function.basis, Some(Basis::Constant));
-    let covariance = covariance.filter(|_| constant)?;
-    Some(covariance[(index, index)].sqrt())
-}
 
 /// p-value of the Wald test of function `f` against a constant: the probability that noise alone causes at least the variation
 /// found. With the parameters `p`, their `covariance` `C` and the parameters `e` of the constant 1, `min_a (p - a e)' C^-1 (p - a e)` has

@@ -89,8 +89,7 @@ impl EquationErrorIntervals {
     /// Errors of the estimates, for the summaries of the functions.
     pub fn errors(&self) -> EstimateErrors<'_> {
         EstimateErrors {
-            covariance: self.bands.covariance.as_ref(),
-            degrees_of_freedom: &self.bands.degrees_of_freedom,
+            bands: Some(&self.bands),
             classifications: &self.classifications,
             effective_parameters: None,
             tests_constants: false,

@@ -1,12 +1,10 @@
 //! The answer of a fit: estimates of natural frequency, damping ratio, coefficients and ratios with their confidence intervals.
 
-use crate::functions::{CoefficientFunction, Ratios};
-use crate::identifiability::{
-    MeanOverRecord, Means, ScaleSource, mean_over_record, mean_weights, scale_source,
-};
+use crate::functions::{CoefficientFunction, Ratio};
+use crate::identifiability::{Curve, Quantities, Quantity, ScaleSource, scale_source};
+use crate::number_format::number_or_nan;
 use crate::problem::Problem;
-use crate::solvers::{Fit, number_or_nan};
-use crate::system::NodalCoefficients;
+use crate::solvers::Fit;
 use serde::{Deserialize, Serialize};
 
 /// How an estimate was obtained.
@@ -39,105 +37,59 @@ pub struct Estimate {
     pub unit: String,
     /// Status.
     pub status: EstimateStatus,
+    /// The mean with its standard error; not in files.
+    #[serde(skip)]
+    pub quantity: Option<Quantity>,
 }
-
-/// A ratio of the shared coefficient set.
-struct RatioName {
-    name: &'static str,
-    /// Name of its band.
-    band: &'static str,
-    unit: &'static str,
-    /// Places of its coefficients: mass, damping, stiffness.
-    places: &'static [usize],
-}
-
-const RATIOS: [RatioName; 4] = [
-    RatioName {
-        name: "natural_frequency",
-        band: "natural frequency",
-        unit: "Hz",
-        places: &[0, 2],
-    },
-    RatioName {
-        name: "damping_ratio",
-        band: "damping ratio",
-        unit: "",
-        places: &[0, 1, 2],
-    },
-    RatioName {
-        name: "k_over_m",
-        band: "k/m",
-        unit: "1/s^2",
-        places: &[0, 2],
-    },
-    RatioName {
-        name: "c_over_m",
-        band: "c/m",
-        unit: "1/s",
-        places: &[0, 1],
-    },
-];
 
 /// Estimates at the end of a fit with their names, the most important first: natural frequency (of the linear part, `sqrt(k/m)/(2 pi)`) and
 /// damping ratio `c/(2 sqrt(k m))`, then the functions, then `k/m` and `c/m`; the ratios before the functions where the samples determine ratios
-/// only.
+/// only. Without `quantities` with standard errors they have no intervals.
 pub fn estimates(
     problem: &Problem,
     fit: &Fit,
-    means: Option<&Means<'_>>,
+    quantities: Option<&Quantities>,
 ) -> Vec<(String, Estimate)> {
-    let best = &fit.best;
-    estimates_at(problem, &best.parameters, &best.evaluation.nodal, means)
-}
-
-/// [`estimates`] with the parameters `theta` and the coefficients of the shared set.
-pub(super) fn estimates_at(
-    problem: &Problem,
-    theta: &[f64],
-    nodal: &NodalCoefficients,
-    means: Option<&Means<'_>>,
-) -> Vec<(String, Estimate)> {
+    let theta = &fit.best.parameters;
+    let quantities = match quantities {
+        Some(quantities) => quantities.clone(),
+        None => Quantities::at(problem, theta),
+    };
     let is_scaled = matches!(
         scale_source(problem),
         ScaleSource::Fixed(_) | ScaleSource::Model
     );
     let values = problem.functions.values(theta);
-    let functions = problem.functions.iter().zip(&values).enumerate();
-    let functions = functions.map(|(f, (function, values))| {
-        let mean = means.map(|means| means.functions[f]);
+    let functions = problem.functions.iter().zip(&values);
+    let functions = functions.zip(quantities.functions);
+    let functions = functions.map(|((function, values), mean)| {
         let status = match () {
             () if function.basis.is_none() || function.prior.is_some() => EstimateStatus::Fixed,
             () if is_scaled && is_coefficient_of_scale(function) => EstimateStatus::OnlyAsRatio,
             () => EstimateStatus::Estimated,
         };
-        let unit = function.quantity.unit();
-        (function.name(), estimate(values, mean, unit, status))
+        (function.name(), Estimate::of(mean, values, status))
     });
     let functions: Vec<_> = functions.collect();
-    drop(values);
-    let nodal = Ratios::of(nodal);
-    let curves = [
-        nodal.frequency,
-        nodal.damping_ratio,
-        nodal.k_over_m,
-        nodal.c_over_m,
-    ];
-    let is_fixed = |places: &[usize]| {
-        let set = problem.functions.coefficient_set(0);
-        let mut parts = set.parts().filter(|(place, _)| places.contains(place));
-        parts.all(|(_, f)| problem.functions.get(f).basis.is_none())
-    };
-    let ratios = RATIOS.iter().zip(&curves).map(|(ratio, values)| {
-        let mean = means.and_then(|means| means.ratio(ratio.band));
-        let status = match is_fixed(ratio.places) {
+    let nodal = &fit.best.evaluation.nodal;
+    let ratio = |ratio: Ratio| {
+        let terms = Curve::Ratio(ratio).terms(problem)?;
+        let mut functions = terms.coefficients.iter().flatten();
+        let status = match functions.all(|f| problem.functions.get(*f).basis.is_none()) {
             true => EstimateStatus::Fixed,
             false => EstimateStatus::Estimated,
         };
-        let estimate = estimate(values, mean, ratio.unit, status);
-        (ratio.name.to_owned(), estimate)
-    });
-    let mut first: Vec<_> = ratios.collect();
-    let last = first.split_off(2);
+        let values = ratio.at_nodes(problem.system.laws(), nodal);
+        let mean = quantities
+            .ratios
+            .iter()
+            .find(|mean| mean.name == ratio.name())?;
+        let estimate = Estimate::of(mean.clone(), &values, status);
+        Some((ratio.key().to_owned(), estimate))
+    };
+    let first = [Ratio::NaturalFrequency, Ratio::DampingRatio];
+    let last = [Ratio::StiffnessOverMass, Ratio::DampingOverMass];
+    let [first, last] = [first, last].map(|ratios| ratios.into_iter().filter_map(ratio).collect());
     match is_scaled {
         true => [first, last, functions].concat(),
         false => [first, functions, last].concat(),
@@ -149,27 +101,19 @@ fn is_coefficient_of_scale(function: &CoefficientFunction) -> bool {
     !function.is_known_part && function.prior.is_none()
 }
 
-fn estimate(
-    values: &[f64],
-    mean: Option<&MeanOverRecord>,
-    unit: &str,
-    status: EstimateStatus,
-) -> Estimate {
-    let value = mean_over_record(values, &mean_weights(values.len()));
-    let half = mean.and_then(|mean| {
-        let [low, high] = mean.interval()?;
-        Some(0.5 * (high - low))
-    });
-    let is_defined = values.iter().all(|v| v.is_finite());
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    Estimate {
-        value,
-        range: is_defined.then_some([least, most]),
-        ci95: half
-            .filter(|_| value.is_finite())
-            .map(|half| [value - half, value + half]),
-        unit: unit.to_owned(),
-        status,
+impl Estimate {
+    /// An estimate with this mean of these values over the record.
+    fn of(mean: Quantity, values: &[f64], status: EstimateStatus) -> Self {
+        let is_defined = values.iter().all(|v| v.is_finite());
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            value: mean.value,
+            range: is_defined.then_some([least, most]),
+            ci95: mean.interval(),
+            unit: mean.unit.clone(),
+            status,
+            quantity: Some(mean),
+        }
     }
 }

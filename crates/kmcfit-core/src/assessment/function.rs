@@ -1,25 +1,22 @@
 //! Summary of each coefficient function of a fit.
 
-use super::{constant_probability, standard_error};
-use crate::diagnostics::student_half_width;
+use super::constant_probability;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::identifiability::{
-    ClassificationKind, FunctionClassification, is_negligible, is_unhindered,
+    Bands, ClassificationKind, FunctionClassification, is_negligible, is_unhindered,
 };
+use crate::number_format::number_or_nan;
 use crate::problem::Problem;
-use crate::solvers::{Fit, Status, number_or_nan};
+use crate::solvers::{Fit, Status};
 use crate::system::NodalCoefficients;
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Errors of the estimates of a fit.
 #[derive(Debug, Clone, Copy)]
 pub struct EstimateErrors<'a> {
-    /// Covariance of the parameters, where standard errors are meaningful.
-    pub covariance: Option<&'a DMatrix<f64>>,
-    /// Degrees of freedom of the estimate of each parameter.
-    pub degrees_of_freedom: &'a [f64],
+    /// Bands and covariance, where standard errors are meaningful.
+    pub bands: Option<&'a Bands>,
     /// Classification of functions and ratios, functions first.
     pub classifications: &'a [FunctionClassification],
     /// Effective number of parameters of the function of each penalty, where there are penalties.
@@ -83,14 +80,6 @@ pub struct FunctionSummary {
     pub truth_rms_error: Option<f64>,
 }
 
-impl FunctionSummary {
-    /// Half-width of the 95 % interval of a constant, where it has a standard error.
-    pub fn half_width(&self) -> Option<f64> {
-        let degrees = self.degrees_of_freedom.unwrap_or(f64::INFINITY);
-        Some(self.standard_error? * student_half_width(degrees))
-    }
-}
-
 /// True if a bound of this parameter alone is active.
 fn is_at_bound(problem: &Problem, theta: &[f64], parameter: usize) -> bool {
     problem.constraints.groups.iter().any(|group| {
@@ -114,7 +103,8 @@ pub fn function_summaries(
     let sizes = problem.natural_scales(&fit.best.evaluation);
     let is_white = errors.is_some_and(|e| e.tests_constants);
     let is_minimum = fit.outcome.status == Status::Converged;
-    let covariance = errors.and_then(|e| e.covariance);
+    let bands = errors.and_then(|e| e.bands);
+    let covariance = bands.and_then(|bands| bands.covariance.as_ref());
     let free = covariance.filter(|_| is_white && is_minimum && is_unhindered(problem, theta));
     let values = problem.functions.values(theta);
     let functions = problem.functions.iter().zip(&values).enumerate();
@@ -131,8 +121,10 @@ pub fn function_summaries(
         let differences = differences.as_ref();
         let rms = |e: &Vec<f64>| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
         // Zero but for rounding where an equality holds the constant.
-        let error = standard_error(function, range.start, covariance)
-            .filter(|error| *error > f64::EPSILON * largest);
+        let estimate = bands
+            .filter(|_| covariance.is_some() && function.basis == Some(Basis::Constant))
+            .map(|bands| &bands.quantities.functions[i])
+            .filter(|estimate| estimate.standard_error > f64::EPSILON * largest);
         FunctionSummary {
             unit: function.quantity.unit().into(),
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
@@ -148,10 +140,8 @@ pub fn function_summaries(
                 }
                 _ => None,
             },
-            standard_error: error,
-            degrees_of_freedom: errors
-                .filter(|_| error.is_some())
-                .map(|e| e.degrees_of_freedom[range.start])
+            standard_error: estimate.map(|estimate| estimate.standard_error),
+            degrees_of_freedom: (estimate.map(|estimate| estimate.degrees))
                 .filter(|degrees| degrees.is_finite()),
             constant_p_value: free.and_then(|covariance| {
                 let effective = effective(problem, i, errors);

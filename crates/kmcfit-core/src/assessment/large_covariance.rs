@@ -6,71 +6,43 @@
 //! `g^T a`, or the squared norm of the rows of samples and priors times `a`. The shift of the estimates by the discretisation error of
 //! the time steps is added as there.
 
-use crate::identifiability::{
-    CovarianceKind, MeanOverRecord, Means, is_bayesian, means_at, step_error,
-};
+use crate::identifiability::{CovarianceKind, Quantities, Quantity, is_bayesian, step_error};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::{BandedFactor, Subproblem};
 use crate::record::{Loss, ScoreCovariance};
 use crate::solvers::{add_penalties, add_priors, add_soft, linear_predictions};
 
-/// Errors of the estimates of a fit with more than 64 parameters.
-#[derive(Debug, Clone)]
-pub struct LargeCovariance {
-    /// Kind of the covariance.
-    pub kind: CovarianceKind,
-    /// Variance of each scalar: initial states and sensor parameters.
-    pub scalar_variances: Vec<f64>,
-    functions: Vec<MeanOverRecord>,
-    ratios: Vec<(&'static str, MeanOverRecord)>,
-}
-
-impl LargeCovariance {
-    /// Covariance at the minimum `theta`, evaluated in `evaluation`. `None` with up to 64 parameters; for samples without sigma, with a
-    /// robust loss or residuals that their noise model does not make white; and where the normal matrix has no banded factor: it is
-    /// singular, or functions with many parameters overlap in time.
-    pub fn of(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
-        let is_gaussian = problem.channels().all(|channel| {
-            channel.weighting().is_sigma()
-                && channel.loss() == Loss::Squares
-                && channel.noise().scores == ScoreCovariance::Model
-        });
-        (problem.parameters() > FEW_PARAMETERS && is_gaussian).then_some(())?;
-        let normal = NormalMatrix::of(problem, theta, evaluation)?;
-        let shift = normal.shift(problem, evaluation);
-        let (mut functions, mut ratios) = means_at(problem, theta);
-        let all = functions
-            .iter_mut()
-            .chain(ratios.iter_mut().map(|(_, mean)| mean));
-        for mean in all {
-            let error = normal.variance(&mean.gradient, &shift).max(0.0).sqrt();
-            mean.standard_error = error.hypot(mean.basis_error);
-        }
-        let scalar = |index: usize| {
-            let mut unit = vec![0.0; normal.parameters];
-            unit[index] = 1.0;
-            normal.variance(&unit, &shift)
-        };
-        let scalar_variances: Vec<f64> = problem.functions.scalar_range().map(scalar).collect();
-        let is_known = |variance: &f64| variance.is_finite() && *variance >= 0.0;
-        scalar_variances.iter().all(is_known).then_some(Self {
-            kind: normal.kind,
-            scalar_variances,
-            functions,
-            ratios,
-        })
+/// Quantities at the minimum `theta`, evaluated in `evaluation`, of a fit with more than 64 parameters. `None` for others; for samples without
+/// sigma, with a robust loss or residuals that their noise model does not make white; and where the normal matrix has no banded factor: it is
+/// singular, or functions with many parameters overlap in time.
+pub fn quantities_of_many(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<Quantities> {
+    let is_gaussian = problem.channels().all(|channel| {
+        channel.weighting().is_sigma()
+            && channel.loss() == Loss::Squares
+            && channel.noise().scores == ScoreCovariance::Model
+    });
+    (problem.parameters() > FEW_PARAMETERS && is_gaussian).then_some(())?;
+    let normal = NormalMatrix::of(problem, theta, evaluation)?;
+    let shift = normal.shift(problem, evaluation);
+    let mut quantities = Quantities {
+        kind: normal.kind,
+        ..Quantities::at(problem, theta)
+    };
+    for quantity in quantities.all_mut() {
+        let variance = normal.variance(&quantity.gradient, &shift);
+        quantity.standard_error = variance.max(0.0).sqrt().hypot(quantity.basis_error);
     }
-
-    /// Means over the record, with their standard errors.
-    pub fn means(&self) -> Means<'_> {
-        Means {
-            functions: self.functions.iter().collect(),
-            ratios: (self.ratios.iter())
-                .map(|(name, mean)| (*name, mean))
-                .collect(),
-        }
-    }
+    let is_known = |scalar: &Quantity| scalar.standard_error.is_finite();
+    quantities
+        .scalars
+        .iter()
+        .all(is_known)
+        .then_some(quantities)
 }
 
 /// Linearised rows at a minimum, in parameters and states, and the factor of their normal matrix.
@@ -109,12 +81,12 @@ impl NormalMatrix {
     }
 
     /// Product of the covariance and the combination `gradient` of the parameters.
-    fn times(&self, gradient: &[f64]) -> Vec<f64> {
+    fn times(&self, gradient: &[(usize, f64)]) -> Vec<f64> {
         let entries = |vector: &[f64]| -> Vec<(usize, f64)> {
             let all = vector.iter().copied().enumerate();
             all.filter(|(_, a)| *a != 0.0).collect()
         };
-        let (mut product, _) = self.factor.times(&entries(gradient));
+        let (mut product, _) = self.factor.times(gradient);
         if self.kind == CovarianceKind::Penalised {
             let mut rows = self.sub.residuals.multiply(&product);
             rows[self.measured..].fill(0.0);
@@ -148,8 +120,8 @@ impl NormalMatrix {
     }
 
     /// Variance of a combination of the parameters.
-    fn variance(&self, gradient: &[f64], shift: &[f64]) -> f64 {
-        let dot = |a: &[f64]| a.iter().zip(gradient).map(|(a, b)| a * b).sum::<f64>();
+    fn variance(&self, gradient: &[(usize, f64)], shift: &[f64]) -> f64 {
+        let dot = |a: &[f64]| gradient.iter().map(|(j, b)| a[*j] * b).sum::<f64>();
         dot(&self.times(gradient)) + dot(shift).powi(2)
     }
 }

@@ -1,7 +1,7 @@
 //! Tests of a fitted model against larger ones, with their results: further terms, errors of the records, finer bases.
 
 use crate::functions::CoefficientKind;
-use crate::solvers::number_or_nan;
+use crate::number_format::number_or_nan;
 use serde::{Deserialize, Serialize};
 
 /// An extension of the model by one parameter.

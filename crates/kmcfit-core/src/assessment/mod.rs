@@ -43,18 +43,18 @@ pub use crate::objective::{all_diagnostics, outliers};
 pub use assumptions::{VerdictAssumption, verdict_assumptions};
 pub use channel::{ResidualPattern, pattern};
 pub use classical::{ClassicalEstimate, ClassicalMethod};
-pub use constants::{constant_probability, standard_error};
+pub use constants::constant_probability;
 pub use doubt::{Doubt, Severity, Unidentified};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
-pub use large_covariance::LargeCovariance;
+pub use large_covariance::quantities_of_many;
 pub use larger_models::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use parts::Parts;
 pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility};
 pub use record_error::RecordError;
-pub use recovery::{RECOVERY_TOLERANCE, TruthErrors};
+pub use recovery::TruthErrors;
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
@@ -74,14 +74,13 @@ use variation::variation_warnings;
 
 use crate::functions::CoefficientFunction;
 use crate::identifiability::{
-    Bands, FunctionClassification, Means, classify_functions, condition_on_bases,
+    Bands, FunctionClassification, Quantities, classify_functions, condition_on_bases,
     condition_on_inputs, condition_on_time,
 };
 use crate::objective::Refined;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
 use crate::threads::{analyses_at_once, both, is_stopped};
-use nalgebra::DMatrix;
 
 /// Results of both analyses, which are computed at the same time for all but the longest records.
 fn at_once<A, B: Send>(
@@ -104,16 +103,12 @@ pub struct FitAssessment {
     pub statistics: FitStatistics,
     /// Plausibility and warnings.
     pub plausibility: Plausibility,
-    /// Covariance of the parameters, where standard errors are meaningful.
-    pub covariance: Option<DMatrix<f64>>,
-    /// Degrees of freedom of the estimate of each parameter ([`Problem::degrees_of_freedom`]).
-    pub degrees_of_freedom: Vec<f64>,
     /// Effective number of parameters of the function of each penalty ([`Problem::effective_parameters`]), where there are penalties.
     pub effective_parameters: Option<Vec<f64>>,
-    /// Bands of functions and ratios, where standard errors are meaningful.
+    /// Covariance, bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
-    /// Covariance of the estimates with more than 64 parameters, where standard errors are meaningful.
-    pub large_covariance: Option<LargeCovariance>,
+    /// Estimates with more than 64 parameters, where standard errors are meaningful.
+    pub of_many: Option<Quantities>,
     /// Classification of functions and ratios by their bands.
     pub classifications: Vec<FunctionClassification>,
     /// Natural frequency and damping ratio by a classical method, where a record allows it.
@@ -162,11 +157,9 @@ impl FitAssessment {
             step_check,
             statistics,
             plausibility,
-            covariance: None,
             effective_parameters: None,
-            degrees_of_freedom: vec![f64::INFINITY; problem.parameters()],
             bands: None,
-            large_covariance: None,
+            of_many: None,
             classifications: Vec::new(),
             classical: None,
             model_tests: ModelTests {
@@ -194,8 +187,8 @@ impl FitAssessment {
             && assessment.plausibility.errors_hold
             && !assessment.plausibility.is_coloured
         {
-            let large = || LargeCovariance::of(problem, &best.parameters, &best.evaluation);
-            assessment.large_covariance = parts.part("confidence intervals", large).flatten();
+            let of_many = || quantities_of_many(problem, &best.parameters, &best.evaluation);
+            assessment.of_many = parts.part("confidence intervals", of_many).flatten();
         }
         if is_one && fit.outcome.status != Status::Failed {
             let bands = assessment.bands.as_ref();
@@ -279,24 +272,19 @@ impl FitAssessment {
         let coarse = test.coarse.into_iter().filter(|_| may_vary);
         let warnings = coarse.map(Doubt::CoarseBasis);
         self.plausibility.warnings.extend(warnings);
-        self.degrees_of_freedom
-            .clone_from(&bands.degrees_of_freedom);
-        self.covariance = bands.covariance.clone();
         self.bands = Some(bands);
     }
 
-    /// Means over the record with their standard errors, where these are meaningful.
-    pub fn means(&self) -> Option<Means<'_>> {
-        let of_bands = self.bands.as_ref().map(Bands::means);
-        let large = self.large_covariance.as_ref();
-        of_bands.or_else(|| large.map(LargeCovariance::means))
+    /// Means over the record and scalars with their standard errors, where these are meaningful.
+    pub fn quantities(&self) -> Option<&Quantities> {
+        let of_bands = self.bands.as_ref().map(|bands| &bands.quantities);
+        of_bands.or(self.of_many.as_ref())
     }
 
     /// Errors of the estimates, for the summaries of the functions.
     pub fn errors(&self) -> EstimateErrors<'_> {
         EstimateErrors {
-            covariance: self.covariance.as_ref(),
-            degrees_of_freedom: &self.degrees_of_freedom,
+            bands: self.bands.as_ref(),
             classifications: &self.classifications,
             effective_parameters: self.effective_parameters.as_deref(),
             tests_constants: !self.plausibility.is_coloured,

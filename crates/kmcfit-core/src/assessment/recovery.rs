@@ -1,7 +1,8 @@
 //! Errors of an identified system relative to the known true system, roughness of the identified coefficients, and a test
 //! whether two true systems are the same.
 
-use crate::functions::Ratios;
+use crate::functions::Ratio;
+use crate::structure::Law;
 use crate::system::NodalCoefficients;
 use serde::Serialize;
 
@@ -36,18 +37,19 @@ pub struct TruthErrors {
 }
 
 impl TruthErrors {
-    /// Errors of `nodal` against `truth`, on the same grid.
-    pub fn of(nodal: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
-        let (found, real) = (Ratios::of(nodal), Ratios::of(truth));
-        let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
-        let c_over_m = largest_error(&found.c_over_m, &real.c_over_m);
+    /// Errors of `nodal` against `truth`, on the same grid, for elements with these laws, damping and stiffness first.
+    pub fn of(laws: &[Law], nodal: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
+        let compared = [Ratio::StiffnessOverMass, Ratio::DampingOverMass].map(|ratio| {
+            let [found, real] = [nodal, truth].map(|nodal| ratio.at_nodes(laws, nodal));
+            [largest_error(&found, &real), largest(&real)]
+        });
+        let [[k_over_m, stiffness_scale], [c_over_m, real_damping]] = compared;
         let mass = largest_error(&nodal.inertias[0], &truth.inertias[0]);
-        let stiffness_scale = largest(&real.k_over_m);
         let critical = 2.0 * stiffness_scale.sqrt();
-        let relative_to_critical = largest(&real.c_over_m) < RECOVERY_TOLERANCE * critical;
+        let relative_to_critical = real_damping < RECOVERY_TOLERANCE * critical;
         let damping_scale = match relative_to_critical {
             true => critical,
-            false => largest(&real.c_over_m),
+            false => real_damping,
         };
         let relative = |error: f64, scale: f64| if error == 0.0 { 0.0 } else { error / scale };
         Self {
@@ -90,6 +92,8 @@ fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
+    const LAWS: [Law; 2] = [Law::Damping, Law::Stiffness];
+
     fn nodal(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
         let constant = |value| vec![value; mass.len()];
         NodalCoefficients {
@@ -102,7 +106,7 @@ mod tests {
     fn systems_with_a_common_factor_are_equal() {
         let truth = nodal(&[1.0, 0.5, 0.8], 0.1, 1.0);
         let doubled = nodal(&[2.0, 1.0, 1.6], 0.2, 2.0);
-        let errors = TruthErrors::of(&doubled, &truth);
+        let errors = TruthErrors::of(&LAWS, &doubled, &truth);
         assert!(errors.within(RECOVERY_TOLERANCE) && !errors.relative_to_critical);
         assert_eq!(errors.mass_relative, 1.0);
     }
@@ -110,7 +114,7 @@ mod tests {
     #[test]
     fn negligible_damping_is_compared_with_critical_damping() {
         let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
-        let errors = TruthErrors::of(&nodal(&[1.0, 1.0], 0.02, 1.0), &truth);
+        let errors = TruthErrors::of(&LAWS, &nodal(&[1.0, 1.0], 0.02, 1.0), &truth);
         assert!(errors.relative_to_critical);
         assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
         assert!(!errors.within(RECOVERY_TOLERANCE));
@@ -119,7 +123,7 @@ mod tests {
     #[test]
     fn a_system_without_mass_is_not_recovered() {
         let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
-        let errors = TruthErrors::of(&nodal(&[1.0, 0.0], 0.0, 1.0), &truth);
+        let errors = TruthErrors::of(&LAWS, &nodal(&[1.0, 0.0], 0.0, 1.0), &truth);
         assert!(!errors.within(RECOVERY_TOLERANCE));
     }
 }

@@ -14,7 +14,7 @@
 use super::Doubt;
 use super::rivals::{fit_of_constants, penalty_freedom};
 use crate::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
-use crate::functions::Ratios;
+use crate::functions::Ratio;
 use crate::objective::{Evaluation, all_diagnostics, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, ChannelKind, Experiment};
@@ -147,8 +147,8 @@ fn second_mode(
     let before = mean_square(&innovations[..count]);
     let residuals: Vec<f64> = channel.residuals(predicted).take(count).collect();
     let nodal = evaluation.nodal_of(experiment.coefficient_set);
-    let ratios = Ratios::of(nodal);
-    let own = [median(ratios.frequency), median(ratios.damping_ratio)];
+    let own = [Ratio::NaturalFrequency, Ratio::DampingRatio];
+    let own = own.map(|ratio| median(ratio.at_nodes(problem.system.laws(), nodal)));
     let starts = record.starts(own, &residuals)?;
     let found = map(starts.len(), available(), |i| record.search(starts[i]));
     let found = found.into_iter().flatten();

@@ -1,9 +1,9 @@
 //! Step-size check: the optimum simulated on a grid of half the step.
 
 use crate::diagnostics::rms;
+use crate::number_format::number_or_nan;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::Problem;
-use crate::solvers::number_or_nan;
 use crate::step::SimulationError;
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,7 @@
 
 use super::Doubt;
 use super::median_frequency::median_frequency;
-use crate::identifiability::Bands;
+use crate::identifiability::{Bands, Quantity};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::signal::median;
@@ -65,7 +65,8 @@ pub(super) fn variation_warnings(
 /// Cycles over the record of the sine that is most of a function beside its line, where it exceeds the band.
 fn cycles(bands: &Bands, f: usize) -> Option<usize> {
     let band = &bands.functions[f];
-    let rest = without_line(&band.values)?;
+    let values: Vec<f64> = band.values().collect();
+    let rest = without_line(&values)?;
     let n = rest.len();
     let variance: f64 = rest.iter().map(|x| x * x).sum();
     let square = |k: usize| {
@@ -80,7 +81,7 @@ fn cycles(bands: &Bands, f: usize) -> Option<usize> {
     let each = CYCLES.filter(|k| 4 * k < n).map(|k| (k, square(k)));
     let (k, largest) = each.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let amplitude = (2.0 * largest / n as f64).sqrt();
-    let widths: Vec<f64> = (0..n).map(|i| band.half_width(i)).collect();
+    let widths: Vec<f64> = band.points.iter().map(Quantity::half_width).collect();
     (largest > ONE_SINE * variance && amplitude > median(widths)).then_some(k)
 }
 

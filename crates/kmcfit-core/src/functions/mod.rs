@@ -11,7 +11,7 @@ mod gram;
 mod local_rows;
 mod parameterization;
 mod penalty;
-mod ratios;
+mod ratio;
 mod scalar;
 mod total_variation;
 
@@ -23,7 +23,8 @@ pub use gram::Gram;
 pub use local_rows::LocalRows;
 pub use parameterization::Parameterization;
 pub use penalty::{Penalty, WeightRule};
-pub use ratios::Ratios;
+pub use ratio::Ratio;
+pub(crate) use ratio::{Formula, MOST_COEFFICIENTS};
 pub use scalar::{Prior, ScalarParameter, ScalarValue};
 pub use total_variation::TotalVariation;
 

@@ -1,37 +1,24 @@
-//! Largest change of a function over the record, with its confidence interval.
+//! Largest change of a function over the record.
 
-use super::bands::Bands;
-use crate::diagnostics::student_half_width;
+use super::curve::{Curve, Curves};
+use super::quantity::Quantity;
 use crate::problem::Problem;
+use nalgebra::DMatrix;
 
 /// Smallest value of a function, in standard errors, by which its change is divided.
 const RESOLVED: f64 = 4.0;
 
-/// Change of a function `p` from one extreme to the other.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RelativeChange {
-    /// Times of the extremes, s, in their order.
-    pub times: [f64; 2],
-    /// `p(times[1]) / p(times[0]) - 1`.
-    pub relative: f64,
-    /// Its 95 % confidence interval by the delta method.
-    pub interval: [f64; 2],
-}
-
-impl Bands {
-    /// Change of the function `f` between the times of its smallest and largest value at the parameters `theta` of these bands; `None` for a
-    /// constant, without a covariance, and where the first value is not resolved.
+impl Quantity {
+    /// Change `p(t_2)/p(t_1) - 1` of the function `f` between the nodes of its smallest and its largest value, with the times of these (s), by a
+    /// covariance of the parameters and their degrees of freedom; `None` for a constant, and where the first value is not resolved.
     pub fn relative_change(
-        &self,
         problem: &Problem,
         theta: &[f64],
         f: usize,
-    ) -> Option<RelativeChange> {
-        let covariance = self.covariance.as_ref()?;
-        let functions = &problem.functions;
-        let (function, range) = (functions.get(f), functions.ranges()[f].clone());
-        let values = functions.values(theta);
-        let values = &values[f];
+        (covariance, degrees): (&DMatrix<f64>, &[f64]),
+    ) -> Option<(Self, [f64; 2])> {
+        let curve = Curves::at(problem, theta, None);
+        let values = &curve.values[f];
         let extreme = |sign: f64| {
             let nodes = 0..values.len();
             nodes.max_by(|a, b| (sign * values[*a]).total_cmp(&(sign * values[*b])))
@@ -39,36 +26,38 @@ impl Bands {
         let (low, high) = (extreme(-1.0)?, extreme(1.0)?);
         (values[low] < values[high]).then_some(())?;
         let nodes = [low.min(high), low.max(high)];
-        let entries = nodes.map(|node| -> Vec<(usize, f64)> {
-            let row = function.design.row(node);
-            row.map(|(j, b)| (range.start + j, b)).collect()
+        let terms = Curve::Function(f).terms(problem)?;
+        let degrees = (problem.functions.ranges()[f].clone()).map(|j| degrees[j]);
+        let degrees = degrees.fold(f64::INFINITY, f64::min);
+        let [first, last] = nodes.map(|node| Self {
+            basis_error: 0.0,
+            ..curve.quantity(&terms, &[(node, 1.0)])
         });
-        let product = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
-            let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
-            pairs
-                .map(|((i, a), (j, b))| a * b * covariance[(*i, *j)])
-                .sum()
+        let first = first.with_covariance(covariance, degrees);
+        (first.value.abs() > RESOLVED * first.standard_error).then_some(())?;
+        let by = |q: &Self, slope: f64| -> Vec<(usize, f64)> {
+            q.gradient.iter().map(|(j, a)| (*j, slope * a)).collect()
         };
-        let [first, last] = nodes.map(|node| values[node]);
-        let [from, to] = &entries;
-        (first.abs() > RESOLVED * product(from, from).sqrt()).then_some(())?;
-        let (slope_first, slope_last) = (-last / (first * first), 1.0 / first);
-        let variance = slope_first * slope_first * product(from, from)
-            + 2.0 * slope_first * slope_last * product(from, to)
-            + slope_last * slope_last * product(to, to);
-        let degrees = self.degrees_of_freedom[range].iter().copied();
-        let half = student_half_width(degrees.fold(f64::INFINITY, f64::min)) * variance.sqrt();
-        let relative = last / first - 1.0;
-        (half.is_finite() && half > 0.0).then_some(RelativeChange {
-            times: nodes.map(|node| problem.system.grid.time(node)),
-            relative,
-            interval: [relative - half, relative + half],
-        })
+        let ratio = last.value / first.value;
+        let change = Self {
+            value: ratio - 1.0,
+            unit: String::new(),
+            gradient: [
+                by(&first, -ratio / first.value),
+                by(&last, 1.0 / first.value),
+            ]
+            .concat(),
+            ..last
+        };
+        let change = change.with_covariance(covariance, degrees);
+        (change.interval().is_some())
+            .then(|| (change, nodes.map(|node| problem.system.grid.time(node))))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Bands;
     use super::*;
     use crate::builder::{Builder, Record};
     use crate::model::CoefficientSpec;
@@ -97,12 +86,14 @@ mod tests {
             .iter()
             .position(|f| f.name() == "stiffness");
         let f = f.unwrap();
-        let found = bands.relative_change(&problem, &theta, f).unwrap();
+        let covariance = bands.covariance.as_ref().unwrap();
+        let errors = (covariance, bands.degrees_of_freedom.as_slice());
+        let (found, times_of) = Quantity::relative_change(&problem, &theta, f, errors).unwrap();
         let change = |theta: &[f64]| {
             let values = problem.functions.values(theta);
             values[f].last().unwrap() / values[f][0] - 1.0
         };
-        assert!((found.relative - change(&theta)).abs() < 1e-12);
+        assert!((found.value - change(&theta)).abs() < 1e-12);
         let gradient: Vec<f64> = (0..theta.len())
             .map(|j| {
                 let moved = |by: f64| {
@@ -114,12 +105,10 @@ mod tests {
             })
             .collect();
         let gradient = nalgebra::DVector::from_vec(gradient);
-        let covariance = bands.covariance.as_ref().unwrap();
         let error = gradient.dot(&(covariance * &gradient)).sqrt();
-        let half = 0.5 * (found.interval[1] - found.interval[0]);
-        assert!((half / (1.959_964 * error) - 1.0).abs() < 1e-5);
-        assert_eq!(found.times, [0.0, times[199]]);
+        assert!((found.half_width() / (1.959_964 * error) - 1.0).abs() < 1e-5);
+        assert_eq!(times_of, [0.0, times[199]]);
         // A constant does not change.
-        assert_eq!(bands.relative_change(&problem, &theta, 1), None);
+        assert_eq!(Quantity::relative_change(&problem, &theta, 1, errors), None);
     }
 }

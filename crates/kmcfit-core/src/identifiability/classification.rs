@@ -2,7 +2,9 @@
 
 use super::band::Band;
 use super::bands::Bands;
+use super::curve::Curve;
 use crate::diagnostics::median_size;
+use crate::functions::Ratio;
 use crate::number_format::at_most;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -200,25 +202,18 @@ pub(crate) fn condition_on_time(
 
 /// Classifications of these functions, and of the ratios with them.
 fn of_functions<'a>(
-    problem: &Problem,
+    problem: &'a Problem,
     classifications: &'a mut [FunctionClassification],
     chosen: &'a [usize],
 ) -> impl Iterator<Item = &'a mut FunctionClassification> {
-    let assembly = problem.functions.coefficient_set(0).to_vec();
-    let terms = problem.system.laws().to_vec();
     let functions = problem.functions.ranges().len();
     let is_chosen = move |index: usize, name: &str| {
-        let of = |term: Law| {
-            let place = terms.iter().position(|t| *t == term);
-            place.map(|place| assembly[place + 1])
+        let curve = match Ratio::named(name) {
+            Some(ratio) if index >= functions => Curve::Ratio(ratio),
+            _ => Curve::Function(index),
         };
-        let numerator = match name {
-            _ if index < functions => Some(index),
-            "k/m" => of(Law::Stiffness),
-            _ => of(Law::Damping),
-        };
-        let mass = (index >= functions).then_some(assembly[0]);
-        let mut all = numerator.into_iter().chain(mass);
+        let terms = curve.terms(problem).into_iter();
+        let mut all = terms.flat_map(|terms| terms.coefficients.concat());
         all.any(|f| chosen.contains(&f))
     };
     let each = classifications.iter_mut().enumerate();
@@ -263,10 +258,10 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
 
 /// Largest half-width and largest absolute value where the function is known.
 fn half_width_and_value(band: &Band, size: f64) -> [f64; 2] {
-    let known = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
+    let known = || (0..band.points.len()).filter(|i| is_known(band, size, *i));
     [
-        known().fold(0.0, |most, i| most.max(band.half_width(i))),
-        known().fold(0.0, |most, i| most.max(band.values[i].abs())),
+        known().fold(0.0, |most, i| most.max(band.points[i].half_width())),
+        known().fold(0.0, |most, i| most.max(band.points[i].value.abs())),
     ]
 }
 
@@ -281,7 +276,8 @@ fn percent(share: f64) -> String {
 
 /// True where the half-width of the band at node `i` is small enough for a function of this size.
 fn is_known(band: &Band, size: f64, i: usize) -> bool {
-    band.values[i].is_finite() && band.half_width(i) / size <= IDENTIFIED
+    let point = &band.points[i];
+    point.value.is_finite() && point.half_width() / size <= IDENTIFIED
 }
 
 /// Classifies every function of the list, then `k/m` and `c/m`.
@@ -297,23 +293,25 @@ pub fn classify_functions(
         let place = problem.system.laws().iter().position(|t| *t == term)?;
         Some(assembly[place + 1])
     };
-    let named = [("k/m", of(Law::Stiffness)), ("c/m", of(Law::Damping))];
-    let ratios: Vec<(&str, usize, f64, Classification)> = (named.into_iter())
-        .filter_map(|(name, function)| {
-            let (band, f) = (bands.ratio(name)?, function?);
-            let size = median_size(&band.values).max(sizes[f] / mass);
-            Some((name, f, size, judge(&bands.times, band, size)))
+    let numerators = [
+        (Ratio::StiffnessOverMass, of(Law::Stiffness)),
+        (Ratio::DampingOverMass, of(Law::Damping)),
+    ];
+    let ratios: Vec<(&Band, usize, f64, Classification)> = (numerators.into_iter())
+        .filter_map(|(ratio, function)| {
+            let (band, f) = (bands.ratio(ratio)?, function?);
+            let values: Vec<f64> = band.values().collect();
+            let size = median_size(&values).max(sizes[f] / mass);
+            Some((band, f, size, judge(&bands.times, band, size)))
         })
         .collect();
     let known = |f: usize| {
-        let with = |(_, function, _, verdict): &&(&str, usize, f64, Classification)| {
+        let with = |(_, function, _, verdict): &&(&Band, usize, f64, Classification)| {
             (*function == f || f == assembly[0])
                 && matches!(verdict, Classification::Identified { .. })
         };
-        ratios
-            .iter()
-            .find(with)
-            .map(|(name, ..)| (*name).to_owned())
+        let found = ratios.iter().find(with);
+        found.map(|(band, ..)| band.name.clone())
     };
     let functions = bands.functions.iter().enumerate().map(|(f, band)| {
         let verdict = match problem.functions.get(f).parameters() {
@@ -324,12 +322,12 @@ pub fn classify_functions(
             },
         };
         let verdict = conditional(problem, verdict);
-        classification(&band.name, verdict, band, sizes[f])
+        classification(verdict, band, sizes[f])
     });
     let functions: Vec<FunctionClassification> = functions.collect();
-    let ratios = (ratios.into_iter()).filter_map(|(name, _, size, verdict)| {
+    let ratios = (ratios.into_iter()).map(|(band, _, size, verdict)| {
         let verdict = conditional(problem, verdict);
-        Some(classification(name, verdict, bands.ratio(name)?, size))
+        classification(verdict, band, size)
     });
     functions.into_iter().chain(ratios).collect()
 }
@@ -374,12 +372,8 @@ fn partly_identified(name: &str, spans: &[[f64; 2]]) -> String {
     format!("{name} is identified only on {}", span_words(spans))
 }
 
-fn classification(
-    name: &str,
-    verdict: Classification,
-    band: &Band,
-    size: f64,
-) -> FunctionClassification {
+fn classification(verdict: Classification, band: &Band, size: f64) -> FunctionClassification {
+    let name = band.name.as_str();
     let sentence = match &verdict {
         Classification::Identified { .. } => identified(name, band, size),
         Classification::Conditional { relative, on } => on.sentence(name, *relative),
@@ -390,8 +384,8 @@ fn classification(
         Classification::NotIdentified => format!("{name} is not identifiable from these records"),
         Classification::Fixed => format!("{name} is fixed by the model"),
     };
-    let known = (0..band.values.len()).filter(|i| is_known(band, size, *i));
-    let identified_range = known.map(|i| [band.values[i]; 2]);
+    let known = (0..band.points.len()).filter(|i| is_known(band, size, *i));
+    let identified_range = known.map(|i| [band.points[i].value; 2]);
     FunctionClassification {
         name: name.to_owned(),
         verdict,

@@ -53,7 +53,7 @@ impl Information {
     pub fn new(problem: &Problem, theta: &[f64], sensitivity: Sensitivity) -> Self {
         let directions = &sensitivity.directions;
         let priors = problem.functions.priors();
-        let row = |(j, prior): (usize, Prior)| directions.row([(j, 1.0 / prior.sigma)].into_iter());
+        let row = |(j, prior): (usize, Prior)| directions.row([(j, 1.0 / prior.sigma)]);
         let priors: Vec<Vec<f64>> = priors.map(row).collect();
         let n = directions.len();
         let priors = DMatrix::from_fn(priors.len(), n, |i, k| priors[i][k]);
@@ -151,31 +151,21 @@ impl Information {
         self.scores.as_ref().map_or(&[], |scores| &scores.held)
     }
 
-    /// Includes the discretisation error of the time steps.
-    pub fn with_numerical_error(self, problem: &Problem, evaluation: &Evaluation) -> Self {
-        let roots = &self.sensitivity.roots;
-        match step_error(problem, evaluation, roots) {
-            Some(error) => self.with_error(&error),
-            None => self,
-        }
-    }
-
-    /// [`Information::with_numerical_error`], with the results on half the step where they are known.
+    /// Includes the discretisation error of the time steps, from the results on half the step where they are known.
     pub fn with_error_of_steps(
         self,
         problem: &Problem,
         evaluation: &Evaluation,
         halved: Option<Refined>,
     ) -> Self {
-        match halved {
-            None => self.with_numerical_error(problem, evaluation),
-            Some(halved) => {
-                let roots = &self.sensitivity.roots;
-                match step_error::of_changes(problem, evaluation, roots, halved) {
-                    Some(error) => self.with_error(&error),
-                    None => self,
-                }
-            }
+        let roots = &self.sensitivity.roots;
+        let error = match halved {
+            None => step_error(problem, evaluation, roots),
+            Some(halved) => step_error::of_changes(problem, evaluation, roots, halved),
+        };
+        match error {
+            Some(error) => self.with_error(&error),
+            None => self,
         }
     }
 
@@ -185,15 +175,6 @@ impl Information {
             error: Some(self.sensitivity.jacobian.tr_mul(error)),
             ..self
         }
-    }
-
-    /// Largest shift of a parameter by the included error, in standard errors without it, with the rows `held` fixed. `None`
-    /// where no error is included.
-    pub fn largest_shift(&self, held: &[&ActiveRow]) -> Option<f64> {
-        let in_errors = self.shifts(held)?.into_iter();
-        let in_errors = in_errors.map(|[shift, error]| shift.abs() / error);
-        // Zero over zero for a parameter that is held or undetermined.
-        Some(in_errors.filter(|x| !x.is_nan()).fold(0.0, f64::max))
     }
 
     /// Shift of each parameter by the included error, and its standard error without it, with the rows `held` fixed. `None`

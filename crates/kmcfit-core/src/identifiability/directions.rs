@@ -16,6 +16,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 #[derive(Debug, Clone)]
 pub struct Directions {
     columns: Vec<Vec<(usize, f64)>>,
+    /// Directions that change each parameter, and by how much.
+    of_parameter: Vec<Vec<(usize, f64)>>,
     metric: Vec<f64>,
     /// Cholesky factor of the inner products of hats; `None` for one direction per parameter, which are orthonormal.
     gram: Option<Cholesky<f64, Dyn>>,
@@ -31,11 +33,7 @@ impl Directions {
         let parameters = problem.parameters();
         if parameters <= most {
             let columns = (0..parameters).map(unit).collect();
-            return Self {
-                columns,
-                metric,
-                gram: None,
-            };
+            return Self::of_columns(columns, metric);
         }
         let ranges = problem.functions.ranges();
         let free = ranges.iter().filter(|r| !r.is_empty()).count();
@@ -53,13 +51,24 @@ impl Directions {
             }
         }
         columns.extend(problem.functions.scalar_range().map(unit));
-        let mut directions = Self {
-            columns,
-            metric,
-            gram: None,
-        };
+        let mut directions = Self::of_columns(columns, metric);
         directions.gram = directions.inner_products();
         directions
+    }
+
+    fn of_columns(columns: Vec<Vec<(usize, f64)>>, metric: Vec<f64>) -> Self {
+        let mut of_parameter = vec![Vec::new(); metric.len()];
+        for (k, column) in columns.iter().enumerate() {
+            column
+                .iter()
+                .for_each(|(j, d)| of_parameter[*j].push((k, *d)));
+        }
+        Self {
+            columns,
+            of_parameter,
+            metric,
+            gram: None,
+        }
     }
 
     /// Cholesky factor of the inner products of the hats; of the identity where the square of a function's size overflows.
@@ -137,21 +146,27 @@ impl Directions {
         self.columns.iter().map(of).collect()
     }
 
-    /// Norm of a sparse linear functional, with each parameter at most once, in the coordinates `z`.
-    pub(super) fn slope_norm(&self, entries: impl Iterator<Item = (usize, f64)>) -> f64 {
-        let squares: f64 = match self.is_coarse() {
-            true => self.row(entries).iter().map(|x| x * x).sum(),
-            // One direction per parameter, of this length.
-            false => entries.map(|(j, a)| a * a / self.metric[j]).sum(),
-        };
-        squares.sqrt()
+    /// Sparse linear functional of the parameters in the coordinates `z`, each once in ascending order.
+    pub(super) fn slope(
+        &self,
+        entries: impl IntoIterator<Item = (usize, f64)>,
+    ) -> Vec<(usize, f64)> {
+        let of = |(j, a): (usize, f64)| self.of_parameter[j].iter().map(move |(k, d)| (*k, a * d));
+        let mut all: Vec<(usize, f64)> = entries.into_iter().flat_map(of).collect();
+        all.sort_by_key(|(k, _)| *k);
+        all.dedup_by(|next, kept| {
+            let is_same = next.0 == kept.0;
+            kept.1 += if is_same { next.1 } else { 0.0 };
+            is_same
+        });
+        all
     }
 
-    /// Sparse linear functional of the parameters in the coordinates `z`.
-    pub(super) fn row(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
-        let mut slopes = vec![0.0; self.parameters()];
-        entries.for_each(|(j, a)| slopes[j] += a);
-        self.functional(&slopes)
+    /// [`Directions::slope`] with the zeros.
+    pub(super) fn row(&self, entries: impl IntoIterator<Item = (usize, f64)>) -> Vec<f64> {
+        let mut row = vec![0.0; self.len()];
+        self.slope(entries).iter().for_each(|(k, x)| row[*k] = *x);
+        row
     }
 }
 

@@ -13,7 +13,7 @@
 use super::columns::stacked;
 use super::covariance::Information;
 use super::factorisation::Factorisation;
-use super::means::means_at;
+use super::quantities::Quantities;
 use super::scaling_ambiguity::ScalingAmbiguity;
 use super::sensitivity::Sensitivity;
 use crate::diagnostics::{NORMAL_975, rms};
@@ -183,11 +183,9 @@ fn narrowed(
     let has_sigmas = problem.channels().all(|c| c.weighting().is_sigma());
     has_sigmas.then_some(())?;
     let directions = &information.sensitivity().directions;
-    let (means, _) = means_at(problem, theta);
-    let all = means.iter().zip(problem.functions.iter());
-    let each = all.filter_map(|(mean, function)| {
-        let entries = mean.gradient.iter().copied().enumerate();
-        let along = DVector::from_vec(directions.row(entries));
+    let means = Quantities::at(problem, theta).functions;
+    let each = means.into_iter().filter_map(|mean| {
+        let along = DVector::from_vec(directions.row(mean.gradient));
         let inside = known.determined().tr_mul(&along);
         let hidden = (along.norm_squared() - inside.norm_squared())
             .max(0.0)
@@ -197,7 +195,7 @@ fn narrowed(
         let after = with_candidate.inverse_root().tr_mul(&inside).norm();
         let half = |error: f64| NORMAL_975 * error / mean.value.abs();
         Some(Narrowed {
-            function: function.name(),
+            function: mean.name,
             before: half(before),
             after: half(after),
         })

@@ -3,12 +3,12 @@
 //! * [`structural_rank()`]: upper bound of the number of identifiable parameter combinations, without a simulation;
 //! * [`Sensitivity`] and [`SingularSpectrum`]: singular values of the weighted Jacobian;
 //! * [`ScalingAmbiguity`]: scaling ambiguity, directions that leave the response unchanged;
+//! * [`Quantity`]: a number that follows from the parameters, with its standard error and interval;
 //! * [`Bands`]: confidence bands of functions and ratios; [`classify_functions`]: their classification;
 //! * [`rank_experiments`]: experiment design.
 
 mod active;
 mod band;
-mod band_curves;
 mod band_notes;
 mod bands;
 mod basis_error;
@@ -18,21 +18,22 @@ mod columns;
 mod components;
 mod covariance;
 mod covariance_kind;
+mod curve;
 mod degrees;
 mod directions;
 mod equation_rows;
 mod experiments;
 mod factorisation;
-mod linearised_curve;
-mod means;
 mod misspecified;
-mod ratios;
+mod quantities;
+mod quantity;
 mod scale_source;
 mod scaling_ambiguity;
 mod sensitivity;
 mod step_error;
 mod step_shift;
 mod structural_rank;
+mod target;
 mod width_shift;
 pub use classification::is_negligible;
 
@@ -53,9 +54,8 @@ pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
     !active::active_rows(problem, theta).is_empty()
 }
 
-pub use band::{Band, BandSide, MeanOverRecord};
+pub use band::Band;
 pub use bands::Bands;
-pub use change::RelativeChange;
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
@@ -65,13 +65,15 @@ pub(crate) use classification::{
 pub(crate) use columns::stacked;
 pub(crate) use covariance::is_bayesian;
 pub use covariance_kind::CovarianceKind;
+pub use curve::Curve;
 pub use equation_rows::EquationRows;
-pub use experiments::{Gain, Ranked, rank_experiments};
+pub use experiments::{Ranked, rank_experiments};
 pub(crate) use factorisation::Factorisation;
-pub use means::Means;
-pub(crate) use means::{mean_over_record, mean_weights, means_at};
+pub use quantities::Quantities;
+pub use quantity::{Quantity, Side};
 pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{Sensitivity, SingularSpectrum};
 pub(crate) use step_error::step_error;
 pub use structural_rank::{RankFinding, ScaleFreedom, structural_rank};
+pub use target::Target;

@@ -18,10 +18,11 @@ impl Problem {
         evaluation: &Evaluation,
         changes: Vec<Vec<f64>>,
     ) -> Option<f64> {
-        let (information, active) =
-            self.changed_information(theta, evaluation, changes, richardson(self))?;
-        let held: Vec<&ActiveRow> = active.iter().collect();
-        information.largest_shift(&held)
+        let shifts = self.shifts_by(theta, evaluation, changes)?;
+        let in_errors = shifts.iter().map(|[shift, error]| shift.abs() / error);
+        // Zero over zero for a parameter that is held or undetermined.
+        let in_errors = in_errors.filter(|x| !x.is_nan());
+        Some(richardson(self) * in_errors.fold(0.0, f64::max))
     }
 
     /// Shift of each parameter by `changes` of the predictions of each channel, by one Gauss-Newton step, and its standard error.
@@ -32,28 +33,16 @@ impl Problem {
         evaluation: &Evaluation,
         changes: Vec<Vec<f64>>,
     ) -> Option<Vec<[f64; 2]>> {
-        let (information, active) = self.changed_information(theta, evaluation, changes, 1.0)?;
-        let held: Vec<&ActiveRow> = active.iter().collect();
-        information.shifts(&held)
-    }
-
-    /// Information with `factor` times the changes as an error, and the active constraints.
-    fn changed_information(
-        &self,
-        theta: &[f64],
-        evaluation: &Evaluation,
-        changes: Vec<Vec<f64>>,
-        factor: f64,
-    ) -> Option<(Information, Vec<ActiveRow>)> {
         let n = self.parameters();
         if n == 0 || n > FEW_PARAMETERS {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);
         let sensitivity = Sensitivity::along(self, evaluation, directions);
-        let error = weighted(self, changes, &sensitivity.roots, factor)?;
+        let error = weighted(self, changes, &sensitivity.roots, 1.0)?;
         let active = active_rows(self, theta);
-        let information = Information::new(self, theta, sensitivity).with_error(&error);
-        Some((information, active))
+        let held: Vec<&ActiveRow> = active.iter().collect();
+        let information = Information::new(self, theta, sensitivity);
+        information.with_error(&error).shifts(&held)
     }
 }

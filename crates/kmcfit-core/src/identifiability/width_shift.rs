@@ -13,12 +13,6 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 
 impl Problem {
-    /// Shift of each parameter where the width of Coulomb friction is halved, and its standard error. `None` without friction or
-    /// parameters, with more than 64 parameters, and where half the step cannot be simulated.
-    pub fn shifts_by_width(&self, theta: &[f64], evaluation: &Evaluation) -> Option<Vec<[f64; 2]>> {
-        self.shifts_by(theta, evaluation, self.changes_by_width(evaluation)?)
-    }
-
     /// Change of the predictions of each channel where the width is halved. `None` without friction, and where half the step cannot be
     /// simulated.
     pub(crate) fn changes_by_width(&self, evaluation: &Evaluation) -> Option<Vec<Vec<f64>>> {

@@ -1,10 +1,11 @@
 //! History of a fit: one record per iteration.
 
 use super::iterate::Iterate;
+use crate::number_format::number_or_nan;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment};
 use crate::step::Trajectory;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// One iteration: cost after it, gradient before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,9 +121,4 @@ impl Recorder {
 /// Ratio `value / reference`, and 0 where both are zero.
 pub(super) fn ratio(value: f64, reference: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / reference }
-}
-
-/// Reads a number; NaN for JSON's `null`, which stands for numbers that are not finite.
-pub fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

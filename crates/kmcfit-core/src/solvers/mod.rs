@@ -45,7 +45,7 @@ pub use active_set::{ActiveGroup, active_constraints};
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use grid_refinement::{GridNotice, OnNodes, fit_on_refined_grids};
-pub use history::{IterationRecord, number_or_nan};
+pub use history::IterationRecord;
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;
 pub(crate) use linearization::{
@@ -61,7 +61,7 @@ pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use observer::{IterationEvent, Observer};
 pub use optimality::Optimality;
 pub use path::{PathPoint, WeightPath};
-pub use reason::{BoundedValue, ConditionFailure, MissingMeasurement, Reason, UnsupportedRecord};
+pub use reason::Reason;
 pub use settings::{FitSettings, Initial, QpSolver, Solver, StartStrategy};
 pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;

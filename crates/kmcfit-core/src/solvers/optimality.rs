@@ -3,13 +3,13 @@
 //! A stopping test uses the last steps, which may be short without a minimum. Therefore the problem is linearised once more at
 //! the final point and solved under its constraints; the predicted decrease of J measures the distance from a minimum.
 
-use super::history::number_or_nan;
 use super::iterate::Iterate;
 use super::linearization::{Linearization, Reduced, linearise};
 use super::reason::{ConditionFailure, Reason};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::constraints::TOLERANCE;
+use crate::number_format::number_or_nan;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::{Solution, Subproblem};
 use serde::{Deserialize, Serialize};

@@ -17,7 +17,7 @@ mod hysteresis;
 mod link;
 
 pub use assembly::{Structure, StructureError};
-pub use elements::{CoefficientKind, CoefficientRow, Law, MOST_ELEMENTS};
+pub use elements::{CoefficientKind, Law, MOST_ELEMENTS};
 pub use ends::Ends;
 pub(crate) use hysteresis::Partials;
 pub(crate) use link::Link;

@@ -8,13 +8,13 @@
 //!
 //! with the derivatives `J` of the sample in the parameters and their covariance `C`.
 
-use super::prediction::Z_95;
+use super::prediction::{band, standard_errors};
 use crate::functions::{CoefficientFunction, CoefficientSet, Parameterization, ScalarParameter};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment};
 use crate::step::SimulationError;
 use crate::system::{Grid, System};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// An identified system: the coefficient set of its equation of motion on the grid of its record.
 #[derive(Debug, Clone)]
@@ -78,46 +78,17 @@ impl IdentifiedSystem {
         sigmas: &[Option<f64>],
     ) -> Result<Vec<PredictedChannel>, SimulationError> {
         let evaluation = problem.evaluate(&self.theta)?;
-        let columns: Vec<Vec<Vec<f64>>> = match &self.covariance {
-            None => Vec::new(),
-            Some(_) => (0..self.theta.len())
-                .map(|j| {
-                    let mut unit = vec![0.0; self.theta.len()];
-                    unit[j] = 1.0;
-                    let change = problem.predictions_tangent(&evaluation, &unit);
-                    change.into_iter().flatten().collect()
-                })
-                .collect(),
-        };
+        let errors = (self.covariance.as_ref())
+            .map(|covariance| standard_errors(problem, &evaluation, covariance));
         let each = problem.predicted(&evaluation).enumerate();
-        let predicted = each.map(|(c, (channel, values))| {
-            let of_channel: Vec<DVector<f64>> = (columns.iter())
-                .map(|change| DVector::from_column_slice(&change[c]))
-                .collect();
-            PredictedChannel {
-                channel: channel.clone(),
-                values: values.clone(),
-                errors: self
-                    .covariance
-                    .as_ref()
-                    .map(|covariance| match of_channel.is_empty() {
-                        true => vec![0.0; values.len()],
-                        false => deviations(&DMatrix::from_columns(&of_channel), covariance),
-                    }),
-                sigma: sigmas.get(c).copied().flatten(),
-            }
+        let predicted = each.map(|(c, (channel, values))| PredictedChannel {
+            channel: channel.clone(),
+            values: values.clone(),
+            errors: errors.as_ref().map(|errors| errors[c].clone()),
+            sigma: sigmas.get(c).copied().flatten(),
         });
         Ok(predicted.collect())
     }
-}
-
-/// Standard deviations `sqrt(diag(J C J^T))`.
-fn deviations(jacobian: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Vec<f64> {
-    let spread = jacobian * covariance;
-    let variance = |i: usize| spread.row(i).dot(&jacobian.row(i));
-    (0..jacobian.nrows())
-        .map(|i| variance(i).max(0.0).sqrt())
-        .collect()
 }
 
 /// Predicted samples of a channel.
@@ -136,21 +107,15 @@ pub struct PredictedChannel {
 impl PredictedChannel {
     /// 95 % band of the response; `None` without a covariance.
     pub fn band(&self) -> Option<Vec<[f64; 2]>> {
-        Some(self.with_deviations(self.errors.iter().flatten().copied()))
-            .filter(|_| self.errors.is_some())
+        let errors = self.errors.as_ref()?;
+        Some(band(&self.values, errors.iter().copied()))
     }
 
     /// 95 % band of a sample, noise included; `None` without covariance or sigma.
     pub fn sample_band(&self) -> Option<Vec<[f64; 2]>> {
         let (errors, sigma) = (self.errors.as_ref()?, self.sigma?);
-        Some(self.with_deviations(errors.iter().map(|error| error.hypot(sigma))))
-    }
-
-    fn with_deviations(&self, deviations: impl Iterator<Item = f64>) -> Vec<[f64; 2]> {
-        let pairs = self.values.iter().zip(deviations);
-        pairs
-            .map(|(z, deviation)| [z - Z_95 * deviation, z + Z_95 * deviation])
-            .collect()
+        let errors = errors.iter().map(|error| error.hypot(sigma));
+        Some(band(&self.values, errors))
     }
 
     /// Share of the samples of the channel within their band ([`Self::sample_band`]).

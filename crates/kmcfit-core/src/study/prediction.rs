@@ -5,15 +5,13 @@
 //! data-consistent extreme systems ([`super::extremes`]).
 
 use super::extremes::Extreme;
+use crate::diagnostics::NORMAL_975;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
 use crate::step::{SimulationError, Trajectory};
 use crate::system::{Excitation, State};
-use nalgebra::{DMatrix, DVector};
-
-/// Half-width of the 95 % interval of a normal variable, in standard deviations.
-pub(super) const Z_95: f64 = 1.959_963_984_540_054;
+use nalgebra::DMatrix;
 
 /// Largest displacement of an extreme system beside that of the optimum which is a prediction: beyond it the records do not limit the response.
 pub const BOUNDED: f64 = 10.0;
@@ -80,23 +78,8 @@ pub fn predict(
     let y = response.displacement(0);
     let band = covariance.map(|covariance| {
         assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
-        let n = theta.len();
-        let mut jacobian = DMatrix::zeros(y.len(), n);
-        let mut unit = vec![0.0; n];
-        for j in 0..n {
-            unit[j] = 1.0;
-            let change = seen.predictions_tangent(&evaluation, &unit);
-            unit[j] = 0.0;
-            jacobian.set_column(j, &DVector::from_column_slice(&change[0][0]));
-        }
-        let spread = &jacobian * covariance;
-        let width = |i: usize| {
-            let variance: f64 = spread.row(i).dot(&jacobian.row(i));
-            Z_95 * variance.max(0.0).sqrt()
-        };
-        (0..y.len())
-            .map(|i| [y[i] - width(i), y[i] + width(i)])
-            .collect()
+        let errors = standard_errors(&seen, &evaluation, covariance);
+        band(y, errors.into_iter().flatten())
     });
     let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
     let mut furthest: Option<(String, f64)> = None;
@@ -131,6 +114,36 @@ pub fn predict(
         unbounded,
         response,
     })
+}
+
+/// Standard errors `sqrt(diag(J C J^T))` of the predictions of each channel, with their derivatives `J` in the parameters.
+pub(super) fn standard_errors(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    covariance: &DMatrix<f64>,
+) -> Vec<Vec<f64>> {
+    let change = |j: usize| -> Vec<Vec<f64>> {
+        let mut unit = vec![0.0; covariance.nrows()];
+        unit[j] = 1.0;
+        let change = problem.predictions_tangent(evaluation, &unit);
+        change.into_iter().flatten().collect()
+    };
+    let changes: Vec<Vec<Vec<f64>>> = (0..covariance.nrows()).map(change).collect();
+    let of_channel = |(c, samples): (usize, usize)| {
+        let jacobian = DMatrix::from_fn(samples, changes.len(), |i, j| changes[j][c][i]);
+        let spread = &jacobian * covariance;
+        let variance = |i: usize| spread.row(i).dot(&jacobian.row(i));
+        (0..samples).map(|i| variance(i).max(0.0).sqrt()).collect()
+    };
+    let samples = problem.channels().map(Channel::len);
+    samples.enumerate().map(of_channel).collect()
+}
+
+/// 95 % band of values with these standard errors, which count as known.
+pub(super) fn band(values: &[f64], errors: impl Iterator<Item = f64>) -> Vec<[f64; 2]> {
+    let halves = errors.map(|error| NORMAL_975 * error);
+    let pairs = values.iter().zip(halves);
+    pairs.map(|(y, half)| [y - half, y + half]).collect()
 }
 
 /// The problem with the case as its only experiment and displacements at all nodes.

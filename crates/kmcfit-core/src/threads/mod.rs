@@ -63,11 +63,6 @@ pub fn analyses_at_once(samples: usize) -> usize {
     if samples <= MOST { available() } else { 1 }
 }
 
-/// Marks this thread as one that shares the processors.
-pub fn share() {
-    GIVEN.set(Some(1));
-}
-
 /// Starts a scoped thread.
 ///
 /// # Errors
@@ -250,10 +245,7 @@ mod tests {
 
     #[test]
     fn a_thread_that_shares_has_none_to_spare() {
-        let spare = std::thread::spawn(|| {
-            share();
-            spare()
-        });
+        let spare = std::thread::spawn(|| sharing(spare));
         assert!(!spare.join().expect("no panic"));
     }
 }

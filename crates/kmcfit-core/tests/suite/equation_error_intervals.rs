@@ -8,6 +8,7 @@ use crate::common::counts::{least_held, seeds};
 use crate::common::synthetic::with_noise;
 use kmcfit_core::internals::assessment::{EquationErrorIntervals, NoIntervals};
 use kmcfit_core::internals::builder::{Builder, Record};
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::identifiability::{Classification, Condition, CovarianceKind};
 use kmcfit_core::internals::noise::automatic_bandwidth;
 use kmcfit_core::internals::problem::Problem;
@@ -125,7 +126,7 @@ fn on_circle(length: usize, bandwidth: f64) -> Vec<f64> {
 fn the_covariance_is_the_dense_sandwich() {
     let problem = problem(&[301, 221], 1);
     let (found, intervals) = fitted(&problem);
-    assert_eq!(intervals.bands.covariance_kind, CovarianceKind::Kernel);
+    assert_eq!(intervals.bands.quantities.kind, CovarianceKind::Kernel);
     let equation = equation_rows(&problem, &found.best.parameters).expect("rows");
     let rows = equation.rows.columns(0, 3).into_owned();
     let scores = DMatrix::from_fn(rows.nrows(), 3, |i, j| rows[(i, j)] * equation.residuals[i]);
@@ -193,7 +194,11 @@ fn ratios_have_intervals_where_the_scale_is_undetermined() {
     let [free, held] = [free, held].map(|b| b.build().expect("a problem"));
     let [(_, free), (_, held)] = [&free, &held].map(fitted);
     for (function, name) in NAMES.iter().enumerate() {
-        assert!(free.bands.functions[function].standard_error[0].is_infinite());
+        assert!(
+            free.bands.functions[function].points[0]
+                .standard_error
+                .is_infinite()
+        );
         let verdict = &free.classifications[function].verdict;
         assert!(
             matches!(verdict, Classification::OnlyRatio(_)),
@@ -201,11 +206,11 @@ fn ratios_have_intervals_where_the_scale_is_undetermined() {
         );
     }
     assert_eq!(free.bands.covariance, None);
-    for name in ["k/m", "c/m"] {
+    for ratio in [Ratio::StiffnessOverMass, Ratio::DampingOverMass] {
         let [a, b] =
-            [&free, &held].map(|i| i.bands.ratio(name).expect("a ratio").standard_error[0]);
+            [&free, &held].map(|i| i.bands.ratio(ratio).expect("a ratio").points[0].standard_error);
         // The proximal term of 1e-9 of the cost.
-        assert!(b > 0.0 && (a / b - 1.0).abs() < 1e-6, "{name}: {a} {b}");
+        assert!(b > 0.0 && (a / b - 1.0).abs() < 1e-6, "{ratio:?}: {a} {b}");
     }
     let varying = CoefficientSpec::piecewise_linear(3, 2.0);
     let varying = Builder::new([varying, CoefficientSpec::constant(1.0), stiffness]).record(record);
@@ -229,7 +234,8 @@ fn coverage(seeds: std::ops::Range<u64>) -> [[usize; 3]; 2] {
         let plain = rows.tr_mul(&rows).try_inverse().expect("regular") * variance;
         for j in 0..3 {
             let off = (theta[j] - TRUTH[j]).abs();
-            let [low, high] = intervals.bands.functions[j].pointwise(0);
+            let estimate = &intervals.bands.functions[j].points[0];
+            let [low, high] = estimate.ends(estimate.half_width());
             held[0][j] += usize::from(low <= TRUTH[j] && TRUTH[j] <= high);
             held[1][j] += usize::from(off <= 1.96 * plain[(j, j)].sqrt());
         }

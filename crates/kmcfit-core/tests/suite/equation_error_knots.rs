@@ -82,7 +82,8 @@ fn coverage(course: Course, is_forced: bool, noise: f64, seed: u64) -> [f64; 2] 
     let bands = intervals.bands;
     let share = |band: &Band, scale: f64| {
         let holds = |(i, t): (usize, &f64)| {
-            (band.values[i] - scale * squared(*t)).abs() <= band.half_width(i)
+            let point = &band.points[i];
+            (point.value - scale * squared(*t)).abs() <= point.half_width()
         };
         let held = bands.times.iter().enumerate().filter(|at| holds(*at));
         held.count() as f64 / bands.times.len() as f64

@@ -5,7 +5,7 @@ use crate::common;
 use crate::common::synthetic::{Truth, run, settings};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Ratios,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Ratio,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -120,11 +120,12 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 
 /// Largest errors of k/m and c/m.
 fn ratio_errors(found: &Fit, truth: &NodalCoefficients) -> [f64; 2] {
-    let (found, exact) = (Ratios::of(&found.best.evaluation.nodal), Ratios::of(truth));
-    [
-        largest(&found.k_over_m, &exact.k_over_m),
-        largest(&found.c_over_m, &exact.c_over_m),
-    ]
+    let laws = [Law::Damping, Law::Stiffness];
+    [Ratio::StiffnessOverMass, Ratio::DampingOverMass].map(|ratio| {
+        let [found, exact] =
+            [&found.best.evaluation.nodal, truth].map(|of| ratio.at_nodes(&laws, of));
+        largest(&found, &exact)
+    })
 }
 
 /// A fit that explains one record with a different parameter set.

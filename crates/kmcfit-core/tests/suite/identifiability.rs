@@ -10,7 +10,7 @@ use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
 };
 use kmcfit_core::internals::identifiability::{
-    Band, BandSide, Bands, Classification, ScaleFreedom, ScalingAmbiguity, Sensitivity,
+    Band, Bands, Classification, ScaleFreedom, ScalingAmbiguity, Sensitivity, Side,
     SingularSpectrum, classify_functions, structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
@@ -265,6 +265,17 @@ struct Coverage {
     seeds: usize,
 }
 
+/// Standard errors of a band.
+fn errors(band: &Band) -> impl Iterator<Item = f64> {
+    band.points.iter().map(|point| point.standard_error)
+}
+
+/// Ends of a band at index `i`.
+fn limits(band: &Band, i: usize) -> [f64; 2] {
+    let point = &band.points[i];
+    point.ends(point.half_width())
+}
+
 impl Coverage {
     fn new() -> Self {
         Self {
@@ -277,7 +288,7 @@ impl Coverage {
         self.hits.resize(truth.len(), 0);
         self.seeds += 1;
         for (i, t) in truth.iter().enumerate() {
-            let [low, high] = band.pointwise(i);
+            let [low, high] = limits(band, i);
             self.hits[i] += usize::from(low <= *t && *t <= high);
         }
     }
@@ -410,11 +421,7 @@ fn undetermined_functions_have_infinite_bands_and_ratios_finite_ones() {
     let bands = Bands::at(&problem, &theta, &here);
     assert_eq!(bands.undetermined, 1);
     for band in &bands.functions {
-        assert!(
-            band.standard_error.iter().all(|s| *s == f64::INFINITY),
-            "{}",
-            band.name
-        );
+        assert!(errors(band).all(|s| s == f64::INFINITY), "{}", band.name);
         assert!(
             band.notes.iter().any(|n| n.starts_with("not identifiable")),
             "{:?}",
@@ -423,9 +430,7 @@ fn undetermined_functions_have_infinite_bands_and_ratios_finite_ones() {
     }
     for band in &bands.ratios {
         assert!(
-            band.standard_error
-                .iter()
-                .all(|s| s.is_finite() && *s > 0.0),
+            errors(band).all(|s| s.is_finite() && s > 0.0),
             "{}",
             band.name
         );
@@ -451,18 +456,11 @@ fn undetermined_functions_have_infinite_bands_and_ratios_finite_ones() {
         .unwrap();
     let bands = Bands::at(&held, &theta, &here);
     assert_eq!(bands.undetermined, 0);
+    assert!(errors(&bands.functions[0]).all(|s| s.is_finite()));
+    let stiffness = &bands.functions[2];
     assert!(
-        bands.functions[0]
-            .standard_error
-            .iter()
-            .all(|s| s.is_finite())
-    );
-    assert!(
-        bands.functions[2]
-            .sides
-            .iter()
-            .all(|s| *s == BandSide::Neither)
-            || bands.functions[2].standard_error.iter().all(|s| *s < 1e-12)
+        stiffness.points.iter().all(|p| p.side == Side::Neither)
+            || errors(stiffness).all(|s| s < 1e-12)
     );
     let words = classify_functions(&held, &here, &bands);
     assert!(
@@ -495,18 +493,18 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
         .unwrap();
     let bands = Bands::at(&problem, &theta, &here);
     let damping = &bands.functions[1];
-    assert!(damping.sides.iter().all(|s| *s == BandSide::Above));
+    assert!(damping.points.iter().all(|p| p.side == Side::Above));
     assert!(
         damping.notes[0].starts_with("one-sided"),
         "{:?}",
         damping.notes
     );
-    assert_eq!(damping.pointwise(3)[0], 0.0);
-    assert!(damping.pointwise(3)[1] > 0.0);
+    assert_eq!(limits(damping, 3)[0], 0.0);
+    assert!(limits(damping, 3)[1] > 0.0);
     // With the damping held the stiffness is known better, and never worse.
     let (held, free) = (&bands.functions[2], &open.functions[2]);
-    assert!(held.standard_error[5] <= free.standard_error[5] * (1.0 + 1e-9));
-    assert_eq!(bands.functions[0].pointwise(0), [nodal.inertias[0][0]; 2]);
+    assert!(held.points[5].standard_error <= free.points[5].standard_error * (1.0 + 1e-9));
+    assert_eq!(limits(&bands.functions[0], 0), [nodal.inertias[0][0]; 2]);
     assert_eq!(
         classify_functions(&problem, &here, &bands)[0].verdict,
         Classification::Fixed
@@ -547,7 +545,7 @@ fn without_sigma_the_residuals_determine_it() {
     let found = guessed.sigma.unwrap();
     assert!((found / sigma - 1.0).abs() < 0.11, "{found}");
     for (a, b) in known.functions.iter().zip(&guessed.functions) {
-        let ratio = b.standard_error[100] / a.standard_error[100];
+        let ratio = b.points[100].standard_error / a.points[100].standard_error;
         assert!((ratio - 1.0).abs() < 0.12, "{ratio}");
     }
 }

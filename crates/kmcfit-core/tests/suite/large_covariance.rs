@@ -2,11 +2,11 @@
 
 use crate::common::forced::{broadband, response, white};
 use kmcfit_core::WeightRule;
-use kmcfit_core::internals::assessment::LargeCovariance;
+use kmcfit_core::internals::assessment::quantities_of_many;
 use kmcfit_core::internals::builder::{Builder, Record};
 use kmcfit_core::internals::constraints::Constraint;
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::{Bands, CovarianceKind};
+use kmcfit_core::internals::identifiability::{Bands, CovarianceKind, Quantities};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
 use kmcfit_core::model::{CoefficientSpec, PenaltySpec, WeightChoice};
@@ -36,20 +36,20 @@ fn fitted(problem: &Problem) -> (Problem, Fit) {
 }
 
 /// Standard errors of all means by the banded factor, and by dense decompositions along all parameters.
-fn both(problem: &Problem) -> (LargeCovariance, Vec<[f64; 2]>) {
+fn both(problem: &Problem) -> (Quantities, Vec<[f64; 2]>) {
     let (problem, fit) = fitted(problem);
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
-    let large = LargeCovariance::of(&problem, theta, evaluation).expect("a covariance");
+    let large = quantities_of_many(&problem, theta, evaluation).expect("a covariance");
     let bands = Bands::at(&problem, theta, evaluation);
     assert_eq!(bands.undetermined, 0);
-    assert_eq!(bands.covariance_kind, large.kind);
-    let (ours, dense) = (large.means(), bands.means());
-    let of_functions = ours.functions.iter().zip(&dense.functions);
+    assert_eq!(bands.quantities.kind, large.kind);
+    let dense = bands.quantities;
+    let of_functions = large.functions.iter().zip(&dense.functions);
     let mut pairs: Vec<[f64; 2]> = of_functions
         .map(|(a, b)| [a.standard_error, b.standard_error])
         .collect();
-    for ((name, a), (other, b)) in ours.ratios.iter().zip(&dense.ratios) {
-        assert_eq!(name, other);
+    for (a, b) in large.ratios.iter().zip(&dense.ratios) {
+        assert_eq!(a.name, b.name);
         pairs.push([a.standard_error, b.standard_error]);
     }
     (large, pairs)
@@ -121,8 +121,8 @@ fn intervals_of_the_mean_stiffness_hold() {
         );
         let (problem, fit) = fitted(&builder.build().unwrap());
         let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
-        let large = LargeCovariance::of(&problem, theta, evaluation).unwrap();
-        let [low, high] = large.means().functions[2].interval().unwrap();
+        let large = quantities_of_many(&problem, theta, evaluation).unwrap();
+        let [low, high] = large.functions[2].interval().unwrap();
         inside += u32::from((low..=high).contains(&52.5));
     }
     // At 95 % fewer than 33 have a probability of 1e-4.

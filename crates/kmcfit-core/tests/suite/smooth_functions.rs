@@ -125,8 +125,8 @@ fn coverage(problem: &Problem, fit: &Fit, course: Course) -> (f64, f64) {
     let (mut held, mut width) = (0, 0.0);
     for (i, t) in bands.times.iter().enumerate() {
         let truth = LEVEL * course(t / end);
-        held += usize::from((band.values[i] - truth).abs() <= band.half_width(i));
-        width += band.half_width(i);
+        held += usize::from((band.points[i].value - truth).abs() <= band.points[i].half_width());
+        width += band.points[i].half_width();
     }
     let count = bands.times.len() as f64;
     (held as f64 / count, width / count)
@@ -244,9 +244,9 @@ fn many_parameters_have_the_same_weight_as_few() {
     assert!((0.7..1.4).contains(&ratio), "{ratio}");
     let (few, many) = (bands(&few, &few_fit), bands(&many, &many_fit));
     let [a, b] = [&few.functions[2], &many.functions[2]];
-    let differences =
-        (0..a.values.len()).map(|i| (a.values[i] - b.values[i]).abs() / a.half_width(i));
-    let mean = differences.sum::<f64>() / a.values.len() as f64;
+    let pairs = a.points.iter().zip(&b.points);
+    let differences = pairs.map(|(a, b)| (a.value - b.value).abs() / a.half_width());
+    let mean = differences.sum::<f64>() / a.points.len() as f64;
     assert!(mean < 0.1, "{mean}");
 }
 

@@ -2,6 +2,7 @@
 
 use crate::common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
 use kmcfit_core::internals::builder::{Builder, Record};
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
@@ -513,7 +514,7 @@ fn standard_errors_and_bands_agree() {
     let covariance = covariance.expect("a force gives the mass");
     assert_eq!(bands.undetermined, 0);
     for (j, band) in bands.functions.iter().enumerate() {
-        let ratio = band.standard_error[0] / covariance[(j, j)].sqrt();
+        let ratio = band.points[0].standard_error / covariance[(j, j)].sqrt();
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
     }
     // The smaller the force, the nearer the mass is to being undetermined. At every size both agree, also at the level of
@@ -536,9 +537,9 @@ fn standard_errors_and_bands_agree() {
             let error = covariance
                 .as_ref()
                 .map_or(f64::INFINITY, |c| c[(j, j)].sqrt());
-            let same = error == band.standard_error[0];
+            let same = error == band.points[0].standard_error;
             // The root of the inverse loses the digits that the singular values have lost.
-            let near = (band.standard_error[0] / error - 1.0).abs() < 1e-3;
+            let near = (band.points[0].standard_error / error - 1.0).abs() < 1e-3;
             assert!(same || near, "1e-{exponent}, {j}: {error}");
         }
         open.push(covariance.is_none());
@@ -551,10 +552,10 @@ fn standard_errors_and_bands_agree() {
     assert!(covariance.is_none());
     assert_eq!(bands.undetermined, 1);
     for band in &bands.functions {
-        assert!(band.standard_error.iter().all(|e| e.is_infinite()));
+        assert!(band.points.iter().all(|p| p.standard_error.is_infinite()));
     }
-    let ratio = bands.ratio("k/m").expect("a stiffness");
-    assert!(ratio.standard_error.iter().all(|e| e.is_finite()));
+    let ratio = bands.ratio(Ratio::StiffnessOverMass).expect("a stiffness");
+    assert!(ratio.points.iter().all(|p| p.standard_error.is_finite()));
 }
 
 /// A free decay with exact samples (closed form), fitted with 100 steps a period: the estimates are off by the discretisation
@@ -590,7 +591,7 @@ fn intervals_contain_the_shift_by_the_time_steps() {
         let bands = Bands::at(&problem, theta, evaluation);
         for (j, truth) in [damping, stiffness].into_iter().enumerate() {
             let error = (theta[j] - truth).abs();
-            let share = bands.functions[j + 1].standard_error[0] / error;
+            let share = bands.functions[j + 1].points[0].standard_error / error;
             // The amplitude converges by one order faster than the phase, (3/4)^-1 7/8 = 1.17 for the midpoint rule, and the
             // phase error of half the step, 0.03 rad, adds its square to the damping.
             let most = [2.0, 1.1][j];
@@ -599,7 +600,7 @@ fn intervals_contain_the_shift_by_the_time_steps() {
                 "{method:?} {j}: {share} of {error}"
             );
             let covariance = bands.covariance.as_ref().unwrap();
-            let same = covariance[(j, j)].sqrt() / bands.functions[j + 1].standard_error[0];
+            let same = covariance[(j, j)].sqrt() / bands.functions[j + 1].points[0].standard_error;
             assert!((same - 1.0).abs() < 1e-9, "{same}");
         }
     }

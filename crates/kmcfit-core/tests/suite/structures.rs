@@ -352,7 +352,8 @@ fn chains_are_recovered() {
         let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).expect("a fit");
         assert_eq!(found.outcome.status, Status::Converged, "{n}");
         let assessment = FitAssessment::of(&problem, &found, true);
-        let covariance = assessment.covariance.expect("a covariance");
+        let bands = assessment.bands.expect("bands");
+        let covariance = bands.covariance.expect("a covariance");
         let errors = (found.best.parameters.iter().zip(&truth)).enumerate();
         let squares: Vec<f64> = errors
             .map(|(j, (x, truth))| (x - truth).powi(2) / covariance[(j, j)])

@@ -110,7 +110,7 @@ fn a_function_that_is_a_sine_oscillates() {
 #[test]
 fn intervals_of_ratios_follow_from_the_covariance() {
     let (problem, fit, assessment) = assessed(&problem());
-    let found = estimates(&problem, &fit, assessment.means().as_ref());
+    let found = estimates(&problem, &fit, assessment.quantities());
     let get = |name: &str| {
         &found
             .iter()
@@ -135,10 +135,8 @@ fn intervals_of_ratios_follow_from_the_covariance() {
             .all(|(_, e)| e.status == EstimateStatus::Estimated)
     );
     let [m, c, k] = [0, 1, 2].map(|j| fit.best.parameters[j]);
-    let covariance = assessment
-        .covariance
-        .as_ref()
-        .expect("identified constants");
+    let bands = assessment.bands.as_ref().expect("bands");
+    let covariance = bands.covariance.as_ref().expect("identified constants");
     let error = |gradient: [f64; 3]| {
         let terms = (0..9).map(|i| gradient[i / 3] * covariance[(i / 3, i % 3)] * gradient[i % 3]);
         terms.sum::<f64>().sqrt()
@@ -200,7 +198,7 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
             .nodes(4 * (SAMPLES - 1) + 1)
             .build();
         let (problem, fit, assessment) = assessed(&problem.unwrap());
-        let all = estimates(&problem, &fit, assessment.means().as_ref());
+        let all = estimates(&problem, &fit, assessment.quantities());
         let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
         (all, reasons, verdict_assumptions(&problem))
     };

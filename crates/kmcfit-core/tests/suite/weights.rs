@@ -3,7 +3,7 @@
 use crate::common;
 use crate::common::counts::seeds;
 
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Ratios, WeightRule};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Ratio, WeightRule};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{
@@ -53,10 +53,10 @@ fn relative_errors(problem: &Problem, theta: &[f64], truth: &NodalCoefficients) 
             .zip(b)
             .fold(0.0f64, |most, (a, b)| most.max((a / b - 1.0).abs()))
     };
-    let (found, exact) = (Ratios::of(&nodal), Ratios::of(truth));
+    let of = |nodal| Ratio::StiffnessOverMass.at_nodes(problem.system.laws(), nodal);
     [
         relative(&nodal.inertias[0], &truth.inertias[0]),
-        relative(&found.k_over_m, &exact.k_over_m),
+        relative(&of(&nodal), &of(truth)),
     ]
 }
 

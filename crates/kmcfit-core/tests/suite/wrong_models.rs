@@ -342,7 +342,7 @@ impl Case {
         };
         let assessment = FitAssessment::of(&problem, &fit, true);
         let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
-        let found = estimates(&problem, &fit, assessment.means().as_ref());
+        let found = estimates(&problem, &fit, assessment.quantities());
         let truths = [
             ("mass", self.mass),
             ("damping", self.damping),

@@ -7,7 +7,7 @@ use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
-use kmcfit_core::internals::assessment::Severity;
+use kmcfit_core::internals::assessment::{Doubt, Severity};
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::record::{ChannelKind, Loss};
@@ -56,6 +56,9 @@ const OPPOSITE: f64 = 0.7;
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
+/// Kind of the warning about codes for missing samples.
+pub const MISSING_CODES: &str = "missing_codes";
+
 /// Warnings about the record of an experiment.
 pub fn of(entry: &Entry<'_>, record: &RawRecord) -> Vec<Finding> {
     let (file, spec) = (entry.at.file, entry.spec);
@@ -78,7 +81,7 @@ pub fn of(entry: &Entry<'_>, record: &RawRecord) -> Vec<Finding> {
             warnings.extend(rest_before_motion(spec, record));
         }
         warnings.extend(unmeasured_force(spec, record));
-        warnings.extend(modes(spec, record));
+        warnings.extend(modes(entry, record));
         warnings.extend(excluded_frequency(file, record));
         warnings
     };
@@ -371,12 +374,12 @@ fn missing_codes(record: &RawRecord) -> Option<Finding> {
         json!(codes)
     );
     let found = json!({"channels": channels, "codes": codes});
-    (!codes.is_empty())
-        .then(|| Finding::having("missing_codes", text, found).rated(Severity::Check))
+    (!codes.is_empty()).then(|| Finding::having(MISSING_CODES, text, found).rated(Severity::Check))
 }
 
 /// A free record, or one with a measured force, in which two modes vibrate.
-fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
+fn modes(entry: &Entry<'_>, record: &RawRecord) -> Option<Finding> {
+    let spec = entry.spec;
     let of_channel = |c: &RawChannel| {
         if !has_input(spec, record) {
             return two_modes(&c.values, c.median_spacing);
@@ -395,7 +398,11 @@ fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
         significant(second, 3)
     );
     let found = json!({"channel": channel, "frequencies": frequencies});
-    Some(Finding::having("two_modes", text, found).rated(Severity::Check))
+    let finding = Finding::having("two_modes", text, found).rated(Severity::Check);
+    Some(finding.about(Doubt::SecondMode {
+        experiment: entry.name(),
+        frequencies,
+    }))
 }
 
 fn has_input(spec: &ExperimentSpec, record: &RawRecord) -> bool {

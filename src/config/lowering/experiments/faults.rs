@@ -9,7 +9,7 @@ use super::data_facts::{
 use crate::finding::Finding;
 use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
-use kmcfit_core::internals::assessment::Severity;
+use kmcfit_core::internals::assessment::{Doubt, Severity};
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::internals::system::round_time;
@@ -262,6 +262,12 @@ impl Column<'_> {
         let warning = Finding::having(kind, warning, of_warning)
             .rated(Severity::Check)
             .with("samples", count);
+        let warning = match fault {
+            FaultName::Saturation => warning.about(Doubt::Saturation {
+                channel: channel.to_owned(),
+            }),
+            FaultName::Dropouts | FaultName::Spikes => warning,
+        };
         [fact, warning].map(|finding| finding.with("channel", channel))
     }
 }

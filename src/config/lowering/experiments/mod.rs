@@ -33,6 +33,7 @@ use kmcfit_core::model::{
 };
 use std::sync::Arc;
 
+pub(super) use data_checks::MISSING_CODES;
 pub(super) use excitation::shape;
 pub(super) use unit::UNIT_ASSUMED;
 

@@ -8,7 +8,7 @@
 //! Masses and springs that are free are multiplied by one factor each for a frequency. The steps are taken in the logarithms of masses,
 //! dampings and stiffnesses, which stay positive without a bound.
 
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization, Ratios};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization, Ratio};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::Experiment;
@@ -232,8 +232,8 @@ fn dominant(problem: &Problem) -> impl Iterator<Item = (f64, f64)> {
 
 /// True for constants in free records whose natural frequency is the dominant one of each channel: a scan finds the same.
 pub(in crate::solvers) fn is_dominant(problem: &Problem, evaluation: &Evaluation) -> bool {
-    let ratios = Ratios::of(&evaluation.nodal);
-    let Some(natural) = ratios.frequency.first().map(|f| TAU * f) else {
+    let natural = Ratio::NaturalFrequency.at_nodes(problem.system.laws(), &evaluation.nodal);
+    let Some(natural) = natural.first().map(|f| TAU * f) else {
         return false;
     };
     let mut all = dominant(problem).peekable();

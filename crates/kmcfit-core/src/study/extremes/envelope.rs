@@ -1,10 +1,9 @@
 //! Envelopes of all coefficient functions and of `k/m` and `c/m`: smallest and largest values compatible with the data.
 
-use super::{
-    Extreme, ExtremePair, ExtremeStatus, MisfitLimit, Target, extreme_pairs, ratios_at, values_at,
-};
+use super::{Extreme, ExtremePair, ExtremeStatus, MisfitLimit, extreme_pairs, values_at};
 use crate::diagnostics::chi_square_one;
-use crate::functions::CoefficientKind;
+use crate::functions::Ratio;
+use crate::identifiability::{Curve, Target};
 use crate::objective::{Evaluation, channel_fit_percent};
 use crate::problem::Problem;
 
@@ -92,30 +91,18 @@ pub fn envelopes(
     threads: usize,
 ) -> Vec<Envelope> {
     let set = problem.functions.coefficient_set(0);
-    let main: &[usize] = set;
-    let mut jobs = Vec::new();
-    for &f in main {
-        let function = problem.functions.get(f);
-        if function.parameters() > 0 {
-            let targets = values_at(problem, f, times);
-            jobs.push((function.name(), function.quantity.unit(), targets));
-        }
+    let free = (set.iter()).filter(|f| problem.functions.get(**f).parameters() > 0);
+    let mut curves: Vec<Curve> = free.map(|f| Curve::Function(*f)).collect();
+    // Of sums with known parts the functions alone.
+    if set.known_parts().is_empty() {
+        let ratios = [Ratio::StiffnessOverMass, Ratio::DampingOverMass];
+        curves.extend(ratios.map(Curve::Ratio));
     }
-    let of = |q: CoefficientKind| {
-        main.iter()
-            .find(|f| problem.functions.get(**f).quantity == q)
-    };
-    let ratios = [
-        ("k/m", CoefficientKind::STIFFNESS, "1/s^2"),
-        ("c/m", CoefficientKind::DAMPING, "1/s"),
-    ];
-    // A ratio of sums with known parts is not a ratio of two functions.
-    let ratios = ratios.into_iter().filter(|_| set.known_parts().is_empty());
-    for (name, over, unit) in ratios {
-        if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::MASS)) {
-            jobs.push((name.to_owned(), unit, ratios_at(problem, over, mass, times)));
-        }
-    }
+    let jobs = curves.into_iter().filter_map(|curve| {
+        let terms = curve.terms(problem)?;
+        Some((terms.name, terms.unit, values_at(problem, curve, times)))
+    });
+    let jobs: Vec<_> = jobs.collect();
     // One list of searches, so that the threads have work to the end.
     let all: Vec<Target> = jobs
         .iter()

@@ -26,9 +26,10 @@ mod search;
 
 pub use envelope::{Envelope, envelopes, is_within_rounding};
 
-use super::functional::{Linear, Target};
 use crate::functions::Penalty;
+use crate::identifiability::{Curve, Target};
 use crate::problem::Problem;
+use crate::system::TimePoint;
 use crate::threads::map_with_progress;
 use search::Search;
 
@@ -113,21 +114,11 @@ pub struct ExtremePair {
     pub high: Extreme,
 }
 
-/// Quantities for the envelope of function `function`: its values at those of `times` (s) within the grid.
-pub fn values_at(problem: &Problem, function: usize, times: &[f64]) -> Vec<Target> {
-    let each = times
-        .iter()
-        .filter_map(|t| Linear::value(problem, function, *t));
-    each.map(Target::Linear).collect()
-}
-
-/// Quantities for the envelope of the ratio of two functions; the second is positive.
-pub fn ratios_at(problem: &Problem, over: usize, under: usize, times: &[f64]) -> Vec<Target> {
-    let each = times.iter().filter_map(|t| {
-        let over = Linear::value(problem, over, *t)?;
-        Some(Target::Ratio(over, Linear::value(problem, under, *t)?))
-    });
-    each.collect()
+/// Quantities for the envelope of a curve: its values at those of `times` (s) within the grid. The mass of a ratio is positive.
+pub fn values_at(problem: &Problem, curve: Curve, times: &[f64]) -> Vec<Target> {
+    let grid = &problem.system.grid;
+    let each = times.iter().filter(|t| TimePoint::of(grid, **t).is_some());
+    each.map(|t| Target::Value(curve, *t)).collect()
 }
 
 /// Smallest and largest value of each target, each from all feasible `starts`, on up to `threads` threads; `None` if no

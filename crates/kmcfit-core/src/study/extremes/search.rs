@@ -3,12 +3,12 @@
 use super::{Extreme, ExtremeStatus, MisfitLimit};
 use crate::constraints::{self, Cone, Rows};
 use crate::functions::Penalty;
+use crate::identifiability::{Quantity, Target};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Kkt, Subproblem};
 use crate::record::{Channel, Loss};
 use crate::solvers::{add_priors, linear_predictions};
-use crate::study::functional::Target;
 use crate::study::refit::{positive_rms, sizes};
 
 /// Initial size of the trust region, relative to the natural sizes of the functions.
@@ -76,20 +76,22 @@ impl Search<'_> {
 
     /// Extreme of `target` towards `side` (-1 smallest, 1 largest) from `start`; `None` if `start` is not feasible.
     pub fn extreme(&self, start: &[f64], target: &Target, side: f64) -> Option<Extreme> {
+        let at = |theta: &[f64]| target.at(self.problem, theta);
         let mut here = self.point(start)?;
+        let mut quantity = at(start)?;
         let sizes = sizes(self.problem, start);
         let mut radius = FIRST_RADIUS;
         let (mut ended, mut programs, mut failures) = (ExtremeStatus::ProgramLimit, 0, 0);
-        let size = target_size(target, start, &sizes);
+        let size = size_of(&quantity, &sizes);
         let reach = self.level.reach * size;
         while programs < self.level.programs {
-            let value = target.of(&here.parameters);
+            let value = quantity.value;
             if side * value >= reach * (1.0 - 1e-6) {
                 ended = ExtremeStatus::SearchLimit;
                 break;
             }
             programs += 1;
-            let proposal = self.push(&here, target, side, radius, reach, &sizes);
+            let proposal = self.push(&here, &quantity, side, radius, reach, &sizes);
             failures = if proposal.is_some() { 0 } else { failures + 1 };
             let gain = proposal.as_ref().map_or(0.0, |p| p.gain);
             if proposal.as_ref().is_some_and(|p| p.is_largest) && gain <= SETTLED * size {
@@ -97,12 +99,13 @@ impl Search<'_> {
                 break;
             }
             let next = proposal.and_then(|p| self.restored(p.trial, &sizes));
+            let next = next.and_then(|n| Some((at(&n.parameters)?, n)));
             let gained = next
                 .as_ref()
-                .map_or(f64::NAN, |n| side * (target.of(&n.parameters) - value));
+                .map_or(f64::NAN, |(there, _)| side * (there.value - value));
             match next {
                 Some(next) if gained > 1e-3 * gain && gained > 0.0 => {
-                    here = next;
+                    (quantity, here) = next;
                     if gained > GOOD * gain {
                         radius = (2.0 * radius).min(RADII[1]);
                     } else if gained < POOR * gain {
@@ -117,10 +120,10 @@ impl Search<'_> {
             }
         }
         Some(Extreme {
-            function: target.name(),
+            function: quantity.name,
             time: target.time(),
             largest: side > 0.0,
-            value: target.of(&here.parameters),
+            value: quantity.value,
             parameters: here.parameters,
             misfit: here.misfit,
             ended,
@@ -181,14 +184,14 @@ impl Search<'_> {
     fn push(
         &self,
         here: &FeasiblePoint,
-        target: &Target,
+        quantity: &Quantity,
         side: f64,
         radius: f64,
         reach: f64,
         sizes: &[f64],
     ) -> Option<SearchStep> {
         let theta = &here.parameters;
-        let slopes = target.slopes(theta);
+        let slopes = &quantity.gradient;
         let mut sub = self.linearised(theta, &here.evaluation);
         for (j, size) in sizes.iter().enumerate() {
             sub.bound([(j, 1.0)], -radius * size, radius * size);
@@ -200,7 +203,7 @@ impl Search<'_> {
             .sum();
         let most = most.max(f64::MIN_POSITIVE);
         let row: Vec<(usize, f64)> = slopes.iter().map(|(j, a)| (*j, side * a / most)).collect();
-        let left = (reach - side * target.of(theta)) / most;
+        let left = (reach - side * quantity.value) / most;
         sub.bound(row.iter().copied(), f64::NEG_INFINITY, left.max(0.0));
         sub.absolute.push(row.iter().copied(), 1.0);
         sub.absolute_weights.push(1.0);
@@ -274,8 +277,8 @@ fn ball(rows: &Rows, radius: f64) -> Cone {
 }
 
 /// Natural size of a quantity, from the sizes of its parameters.
-fn target_size(target: &Target, theta: &[f64], sizes: &[f64]) -> f64 {
-    let slopes = target.slopes(theta);
-    let change: f64 = slopes.iter().map(|(j, a)| (a * sizes[*j]).abs()).sum();
-    change.max(target.of(theta).abs()).max(f64::MIN_POSITIVE)
+fn size_of(quantity: &Quantity, sizes: &[f64]) -> f64 {
+    let slopes = quantity.gradient.iter();
+    let change: f64 = slopes.map(|(j, a)| (a * sizes[*j]).abs()).sum();
+    change.max(quantity.value.abs()).max(f64::MIN_POSITIVE)
 }

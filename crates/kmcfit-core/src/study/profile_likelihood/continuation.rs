@@ -2,11 +2,11 @@
 
 use super::{End, FAR, Interval, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
+use crate::identifiability::{Quantity, Target};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::solvers::{Iterate, Status, active_constraints, fit_from};
 use crate::step::SimulationError;
-use crate::study::functional::Linear;
 use crate::study::refit::{nearest, settings, sizes};
 
 /// Rise in one step, in quantiles, above which a fit is taken to have left the minimum.
@@ -39,13 +39,13 @@ fn names(problem: &Problem, point: &Iterate) -> Vec<String> {
         .collect()
 }
 
-/// The problem with the quantity fixed at `value`.
-fn held(problem: &Problem, of: &Linear, value: f64) -> Problem {
+/// The problem with the quantity, made at zero parameters, fixed at `value`.
+fn held(problem: &Problem, (of, time): (&Quantity, Option<f64>), value: f64) -> Problem {
     let mut held = problem.clone();
     let mut group = RowGroup::new(HELD);
-    let right = value - of.constant;
-    let time = of.time.unwrap_or(problem.system.grid.start());
-    group.push(of.entries.iter().copied(), [right, right], [time, time]);
+    let right = value - of.value;
+    let time = time.unwrap_or(problem.system.grid.start());
+    group.push(of.gradient.iter().copied(), [right, right], [time, time]);
     held.parts_mut().constraints.groups.push(group);
     held
 }
@@ -63,7 +63,9 @@ struct ProfilePoint {
 /// The computation of one profile.
 pub struct ProfileSearch<'a> {
     problem: &'a Problem,
-    of: &'a Linear,
+    /// At zero parameters.
+    of: Quantity,
+    time: Option<f64>,
     how: &'a ProfileSettings,
     sizes: Vec<f64>,
     base: f64,
@@ -77,25 +79,30 @@ impl<'a> ProfileSearch<'a> {
     pub fn new(
         problem: &'a Problem,
         optimum: &[f64],
-        of: &'a Linear,
+        of: &Target,
         how: &'a ProfileSettings,
     ) -> Result<Self, SimulationError> {
         let start = fit_from(problem, optimum, &settings())?.best;
         let cost = start.evaluation.cost;
+        let time = of.time();
+        let of = of.at(problem, &vec![0.0; problem.parameters()]);
+        let of = of.filter(|of| of.value.is_finite());
+        let of = of.expect("a quantity that is linear in the parameters");
         Ok(Self {
             problem,
-            of,
+            time,
             how,
             sizes: sizes(problem, &start.parameters),
             base: cost,
             sample_count: problem.sample_count() as f64,
             sigma: problem.channels().all(|c| c.weighting().is_sigma()),
             points: vec![ProfilePoint {
-                value: of.of(&start.parameters),
+                value: of.linear_at(&start.parameters),
                 cost,
                 active: names(problem, &start),
                 point: start,
             }],
+            of,
         })
     }
 
@@ -121,7 +128,7 @@ impl<'a> ProfileSearch<'a> {
 
     /// Best fit with the quantity fixed at `value`, started at `guess`.
     fn fit(&self, problem: &Problem, value: f64, guess: &[f64]) -> Result<ProfilePoint, String> {
-        let held = held(problem, self.of, value);
+        let held = held(problem, (&self.of, self.time), value);
         let start = nearest(&held, guess, &self.sizes)
             .ok_or_else(|| "the constraints do not allow the value".to_owned())?;
         let found = fit_from(&held, &start, &settings()).map_err(|b| b.to_string())?;
@@ -142,9 +149,9 @@ impl<'a> ProfileSearch<'a> {
 
     /// Farthest value towards `side` within constraints and limits, and the kind of limit there.
     fn reach(&self, side: f64, theta: &[f64]) -> (f64, End) {
-        let here = self.of.of(theta);
+        let here = self.of.linear_at(theta);
         let limit = self.how.limits[usize::from(side > 0.0)];
-        let size: f64 = (self.of.entries.iter())
+        let size: f64 = (self.of.gradient.iter())
             .map(|(j, a)| (a * self.sizes[*j]).abs())
             .sum();
         let (far, what) = match limit.is_finite() {
@@ -158,7 +165,7 @@ impl<'a> ProfileSearch<'a> {
         let unit = (far - here).abs().max(f64::MIN_POSITIVE);
         let mut sub = Subproblem::new(theta.len());
         sub.residuals.push(
-            self.of.entries.iter().map(|(j, a)| (*j, a / unit)),
+            self.of.gradient.iter().map(|(j, a)| (*j, a / unit)),
             (far - here) / unit,
         );
         sub.constrain(&self.problem.constraints, theta);
@@ -169,7 +176,7 @@ impl<'a> ProfileSearch<'a> {
         if !solution.status.is_point() {
             return (far, what);
         }
-        let reached = (self.of).of(&self.problem.constraints.moved(theta, &solution.z));
+        let reached = (self.of).linear_at(&self.problem.constraints.moved(theta, &solution.z));
         if (far - reached).abs() <= 1e-3 * unit {
             return (far, what);
         }
@@ -183,8 +190,9 @@ impl<'a> ProfileSearch<'a> {
 
     fn first_step(&self, start: &Iterate) -> f64 {
         let covariance = self.problem.covariance(&start.evaluation);
-        let deviation = covariance.map_or(0.0, |c| 0.5 * self.of.deviation(&c));
-        let size: f64 = (self.of.entries.iter())
+        let of = |c| self.of.clone().with_covariance(&c, f64::INFINITY);
+        let deviation = covariance.map_or(0.0, |c| 0.5 * of(c).standard_error);
+        let size: f64 = (self.of.gradient.iter())
             .map(|(j, a)| (a * self.sizes[*j]).abs())
             .sum();
         let usable = deviation > 1e-9 * size && deviation < size;

@@ -17,7 +17,7 @@
 
 mod continuation;
 
-use super::functional::Linear;
+use crate::identifiability::Target;
 use crate::problem::Problem;
 use crate::step::SimulationError;
 use continuation::ProfileSearch;
@@ -143,7 +143,7 @@ impl Profile {
     }
 }
 
-/// Computes the profile of `of` about the fitted parameters `optimum`.
+/// Computes the profile of a quantity that is linear in the parameters, no ratio, about the fitted parameters `optimum`.
 ///
 /// The value moves outwards from the optimum. Each fit (Gauss–Newton under the constraints) starts from its neighbours,
 /// until the cost has risen by the quantile or a bound, a limit or the number of steps is reached. A secant method on the
@@ -151,10 +151,13 @@ impl Profile {
 ///
 /// # Errors
 /// A [`SimulationError`] if the simulation at the optimum fails.
+///
+/// # Panics
+/// For a ratio, and for a time outside the grid.
 pub fn profile(
     problem: &Problem,
     optimum: &[f64],
-    of: &Linear,
+    of: &Target,
     how: &ProfileSettings,
 ) -> Result<Profile, SimulationError> {
     ProfileSearch::new(problem, optimum, of, how).map(ProfileSearch::run)

@@ -1,15 +1,17 @@
 use super::problems::{linear, regular};
+use super::profile::error;
 use crate::common::{csv, initial, paper_problem, paper_system, shared};
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{Basis, Penalty};
+use kmcfit_core::internals::functions::{Basis, Penalty, Ratio};
+use kmcfit_core::internals::identifiability::{Curve, Target};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::extremes::{
-    ExtremeStatus, MisfitLimit, extreme, extreme_pairs, is_within_rounding, ratios_at, values_at,
+    ExtremeStatus, MisfitLimit, extreme, extreme_pairs, is_within_rounding, values_at,
 };
 use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
-use kmcfit_core::internals::study::{Linear, ProfileSettings, Target, profile};
+use kmcfit_core::internals::study::{ProfileSettings, profile};
 
 fn optimum(problem: &Problem) -> (Vec<f64>, f64) {
     let settings = crate::common::synthetic::settings();
@@ -26,15 +28,14 @@ fn the_extremes_of_an_ellipse_are_those_of_its_closed_form() {
         .covariance(&problem.evaluate(&best).unwrap())
         .unwrap();
     let level = MisfitLimit::of(misfit + QUANTILE_95);
-    let mixed = Linear {
-        entries: vec![(0, 1.0), (1, -0.5)],
-        ..Linear::parameter(0)
-    };
-    for q in [Linear::parameter(0), Linear::parameter(1), mixed] {
-        let half = QUANTILE_95.sqrt() * q.deviation(&covariance);
-        for (largest, expected) in [(true, q.of(&best) + half), (false, q.of(&best) - half)] {
-            let found =
-                extreme(&problem, &best, &Target::Linear(q.clone()), largest, &level).unwrap();
+    let mixed = Target::Parameters(vec![(0, 1.0), (1, -0.5)]);
+    for q in [Target::parameter(0), Target::parameter(1), mixed] {
+        let half = QUANTILE_95.sqrt() * error(&problem, &q, &best, &covariance);
+        for (largest, expected) in [
+            (true, q.at(&problem, &best).unwrap().value + half),
+            (false, q.at(&problem, &best).unwrap().value - half),
+        ] {
+            let found = extreme(&problem, &best, &q, largest, &level).unwrap();
             println!(
                 "{}: {} {expected}, {:?} {}",
                 found.name(),
@@ -57,20 +58,13 @@ fn the_extremes_are_the_ends_of_the_profile() {
     let (best, misfit) = optimum(&problem);
     let level = MisfitLimit::of(misfit + QUANTILE_95);
     for j in 0..2 {
-        let q = Linear::parameter(j);
+        let q = Target::parameter(j);
         let profile = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
         let [low, high] = profile.interval.map(Option::unwrap);
-        let bands = extreme_pairs(
-            &problem,
-            std::slice::from_ref(&best),
-            &[Target::Linear(q)],
-            &level,
-            2,
-        )
-        .unwrap();
+        let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &[q], &level, 2).unwrap();
         let found = [bands[0].low.value, bands[0].high.value];
         println!("{found:?} {low} {high}");
-        let q = Target::Linear(Linear::parameter(j));
+        let q = Target::parameter(j);
         let one = extreme_pairs(&problem, std::slice::from_ref(&best), &[q], &level, 1).unwrap();
         assert_eq!(one, bands, "the threads change no bit");
         let tolerance = 1e-6 * (high - low);
@@ -93,11 +87,11 @@ fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
         .unwrap();
     let (best, misfit) = optimum(&problem);
     let level = MisfitLimit::of(misfit + QUANTILE_95);
-    let q = Linear::parameter(1);
+    let q = Target::parameter(1);
     let how = ProfileSettings::default();
     let profile = profile(&problem, &best, &q, &how).unwrap();
     let [low, high] = profile.interval.map(Option::unwrap);
-    let targets = [Target::Linear(q)];
+    let targets = [q];
     let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let found = [bands[0].low.value, bands[0].high.value];
     println!("{found:?} {low} {high}");
@@ -146,7 +140,7 @@ fn extremes_of_the_paper_s_data_contain_the_truth_and_the_paper_s_optimum() {
     let optimum = shared("reference").map(|folder| csv(&folder.join("paper_optimum.csv")));
     let columns = [1, 3, 2];
     for f in 0..3 {
-        let targets = values_at(&problem, f, &times);
+        let targets = values_at(&problem, Curve::Function(f), &times);
         let clock = std::time::Instant::now();
         let bands =
             extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
@@ -204,14 +198,14 @@ fn ratios_have_extremes_of_their_own() {
         .unwrap();
     let (best, misfit) = optimum(&problem);
     let level = MisfitLimit::of(misfit + QUANTILE_95);
-    let targets = ratios_at(&problem, 2, 0, &[3.0]);
+    let targets = values_at(&problem, Curve::Ratio(Ratio::StiffnessOverMass), &[3.0]);
     let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let (known, start) = (regular(3), best[2] / best[0]);
     let (fixed, _) = optimum(&known);
     let profile = profile(
         &known,
         &fixed,
-        &Linear::parameter(1),
+        &Target::parameter(1),
         &ProfileSettings::default(),
     )
     .unwrap();
@@ -248,7 +242,7 @@ fn roughness_limits_bound_the_extremes() {
             budgets: (0..3).map(|f| (rows(f), budget)).collect(),
             ..MisfitLimit::of(0.0114)
         };
-        let targets = values_at(&problem, 0, &[15.0]);
+        let targets = values_at(&problem, Curve::Function(0), &[15.0]);
         let clock = std::time::Instant::now();
         let band =
             &extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap()[0];
@@ -291,17 +285,17 @@ fn the_paper_s_optimum_is_within_its_level_on_its_grid() {
         ..MisfitLimit::of(0.0114)
     };
     let clock = std::time::Instant::now();
-    let q = values_at(&problem, 0, &[12.5]).remove(0);
+    let q = values_at(&problem, Curve::Function(0), &[12.5]).remove(0);
     let found = extreme(&problem, &optimum, &q, false, &level).unwrap();
     println!(
         "{}: {} from {}, {:?}, {:.1} s",
         found.name(),
         found.value,
-        q.of(&optimum),
+        q.at(&problem, &optimum).unwrap().value,
         found.ended,
         clock.elapsed().as_secs_f64()
     );
-    assert!(found.misfit <= 0.0114 && found.value < q.of(&optimum));
+    assert!(found.misfit <= 0.0114 && found.value < q.at(&problem, &optimum).unwrap().value);
 }
 
 /// Samples that the response matches to machine precision give no limit of the misfit once penalties determine every function.

@@ -1,11 +1,12 @@
 use super::problems::regular;
 use crate::common;
+use kmcfit_core::internals::functions::Ratio;
 use kmcfit_core::internals::functions::{Basis, Penalty};
+use kmcfit_core::internals::identifiability::{Curve, Target};
 use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs, ratios_at};
+use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
 use kmcfit_core::internals::study::prediction::{PredictionCase, predict};
 use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
-use kmcfit_core::internals::study::{Linear, Target};
 use kmcfit_core::internals::system::{Excitation, State};
 
 /// The band is as wide as the spread of the responses of refitted systems. The envelope over the extreme systems, at the ends of
@@ -30,7 +31,7 @@ fn the_band_of_a_prediction_agrees_with_refits() {
         ..PredictionCase::free("another state", State::one(-0.5, 2.0))
     };
     let level = MisfitLimit::of(best.evaluation.misfit + QUANTILE_95);
-    let targets = [0, 1].map(|j| Target::Linear(Linear::parameter(j)));
+    let targets = [0, 1].map(Target::parameter);
     let bands = extreme_pairs(
         &problem,
         std::slice::from_ref(&best.parameters),
@@ -111,10 +112,8 @@ fn systems_of_equal_fit_differ_in_prediction() {
         ..MisfitLimit::of(0.0114)
     };
     // Extremes of c/m and k/m, the ratios that a free response determines.
-    let targets: Vec<Target> = [1, 2]
-        .iter()
-        .flat_map(|f| ratios_at(&problem, *f, 0, &[12.0]))
-        .collect();
+    let ratios = [Ratio::DampingOverMass, Ratio::StiffnessOverMass].map(Curve::Ratio);
+    let targets = ratios.map(|ratio| Target::Value(ratio, 12.0));
     let bands = extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
     for band in &bands {
         println!(

@@ -6,13 +6,15 @@ use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Penalty, ScalarValue,
 };
+use kmcfit_core::internals::identifiability::{Curve, Target};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
 use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
 use kmcfit_core::internals::study::profile_likelihood::{End, Interval, QUANTILE_95};
-use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile};
+use kmcfit_core::internals::study::{Profile, ProfileSettings, profile};
 use kmcfit_core::internals::system::{Excitation, Method};
+use nalgebra::DMatrix;
 
 fn optimum(problem: &Problem) -> Vec<f64> {
     let settings = crate::common::synthetic::settings();
@@ -26,25 +28,39 @@ fn of(problem: &Problem, j: usize) -> Profile {
     profile(
         problem,
         &optimum(problem),
-        &Linear::parameter(j),
+        &Target::parameter(j),
         &ProfileSettings::default(),
     )
     .unwrap()
 }
 
+/// Standard error of a quantity at `theta`.
+pub(super) fn error(
+    problem: &Problem,
+    q: &Target,
+    theta: &[f64],
+    covariance: &DMatrix<f64>,
+) -> f64 {
+    let q = q.at(problem, theta).unwrap();
+    q.with_covariance(covariance, f64::INFINITY).standard_error
+}
+
 /// `q +- sqrt(3.841 C_qq)` where the predictions are linear in the parameters.
-fn is_closed_form(problem: &Problem, q: &Linear) {
+fn is_closed_form(problem: &Problem, q: &Target) {
     let best = optimum(problem);
     let evaluation = problem.evaluate(&best).unwrap();
     let covariance = problem.covariance(&evaluation).unwrap();
-    let half = (QUANTILE_95 * q.deviation(&covariance).powi(2)).sqrt();
+    let half = (QUANTILE_95 * error(problem, q, &best, &covariance).powi(2)).sqrt();
     let found = profile(problem, &best, q, &ProfileSettings::default()).unwrap();
     assert_eq!(found.verdict, Interval::Identified);
     let [low, high] = found.interval.map(Option::unwrap);
-    let expected = [q.of(&best) - half, q.of(&best) + half];
+    let expected = [
+        q.at(problem, &best).unwrap().value - half,
+        q.at(problem, &best).unwrap().value + half,
+    ];
     println!(
         "{}: {low} {high}, {expected:?}, {} fits",
-        q.name,
+        found.name,
         found.values.len()
     );
     assert!(
@@ -59,7 +75,7 @@ fn is_closed_form(problem: &Problem, q: &Linear) {
     assert!(found.better_optimum.is_none());
     // The cost is the parabola at every value on the way.
     for (value, cost) in found.values.iter().zip(&found.costs) {
-        let parabola = QUANTILE_95 * ((value - q.of(&best)) / half).powi(2);
+        let parabola = QUANTILE_95 * ((value - q.at(problem, &best).unwrap().value) / half).powi(2);
         let rise = cost - found.optimum_cost;
         assert!(
             (rise - parabola).abs() < 1e-6 * (1.0 + parabola),
@@ -72,7 +88,7 @@ fn is_closed_form(problem: &Problem, q: &Linear) {
 fn initial_state_and_offset_have_the_intervals_of_linear_regression() {
     let problem = linear(1);
     for index in 0..3 {
-        is_closed_form(&problem, &Linear::scalar(&problem, index));
+        is_closed_form(&problem, &Target::Scalar(index));
     }
 }
 
@@ -99,7 +115,7 @@ fn the_gain_of_a_driven_sensor_has_its_closed_form() {
     };
     let scalars = vec![scalar("gain", 0.7, None), scalar("offset", 0.1, None)];
     let problem = problem(system, constants(201, [None; 3], truth), scalars, record);
-    is_closed_form(&problem, &Linear::scalar(&problem, 0));
+    is_closed_form(&problem, &Target::Scalar(0));
 }
 
 #[test]
@@ -108,7 +124,13 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
     for j in 0..2 {
         let found = of(&problem, j);
         let evaluation = problem.evaluate(&optimum(&problem)).unwrap();
-        let deviation = Linear::parameter(j).deviation(&problem.covariance(&evaluation).unwrap());
+        let covariance = problem.covariance(&evaluation).unwrap();
+        let deviation = error(
+            &problem,
+            &Target::parameter(j),
+            &optimum(&problem),
+            &covariance,
+        );
         let [low, high] = found.interval.map(Option::unwrap);
         println!("{}", found.sentence());
         assert_eq!(found.verdict, Interval::Identified);
@@ -188,7 +210,7 @@ fn a_better_optimum_on_the_way_is_reported() {
         step: Some(0.1),
         ..ProfileSettings::default()
     };
-    let q = Linear::parameter(0);
+    let q = Target::parameter(0);
     let found = profile(&problem, &[7.546], &q, &how).unwrap();
     println!("{}", found.sentence());
     let better = found.better_optimum.as_ref().expect("2.25 or 22.88");
@@ -211,7 +233,7 @@ fn a_nodal_function_has_a_profile() {
     problem.penalize(Penalty::new(0, 2, 1e4, rows)).unwrap();
     let settings = crate::common::synthetic::settings();
     let best = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
-    let q = Linear::value(&problem, 0, 12.5).unwrap();
+    let q = Target::Value(Curve::Function(0), 12.5);
     let how = ProfileSettings::default();
     let found = profile(&problem, &best.best.parameters, &q, &how).unwrap();
     println!("{} ({} fits)", found.sentence(), found.values.len());
@@ -246,11 +268,12 @@ fn without_sigma_the_interval_is_that_of_the_likelihood_ratio() {
         .covariance(&problem.evaluate(&best).unwrap())
         .unwrap();
     let (n, p) = (problem.sample_count() as f64, 3.0);
-    let q = Linear::scalar(&problem, 1);
-    let half = ((QUANTILE_95 / n).exp_m1() * (n - p)).sqrt() * q.deviation(&covariance);
+    let q = Target::Scalar(1);
+    let half =
+        ((QUANTILE_95 / n).exp_m1() * (n - p)).sqrt() * error(&problem, &q, &best, &covariance);
     let found = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
     let [low, high] = found.interval.map(Option::unwrap);
-    let middle = q.of(&best);
+    let middle = q.at(&problem, &best).unwrap().value;
     println!("{low} {high}, {} {}", middle - half, middle + half);
     assert!((low - (middle - half)).abs() < 1e-6 * half);
     assert!((high - (middle + half)).abs() < 1e-6 * half);
@@ -277,20 +300,23 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
         .unwrap();
     let best = optimum(&problem);
     let misfit = problem.evaluate(&best).unwrap().misfit;
-    let q = Linear::mean(&problem, 2);
-    let at = Linear::value(&problem, 2, 4.0).unwrap();
+    let q = Target::Mean(Curve::Function(2));
+    let at = Target::Value(Curve::Function(2), 4.0);
     let (nodal, theta) = (problem.functions.nodal(&best), &best);
     let node = (4.0 / problem.system.grid.step()).round() as usize;
-    assert!((at.of(theta) - nodal.coefficients[1][node]).abs() < 1e-12);
-    assert!(Linear::value(&problem, 2, 10.1).is_none());
+    assert!((at.at(&problem, theta).unwrap().value - nodal.coefficients[1][node]).abs() < 1e-12);
+    assert!(
+        Target::Value(Curve::Function(2), 10.1)
+            .at(&problem, &best)
+            .is_none()
+    );
     let list = [q, at];
     let how = ProfileSettings::default();
     let found = list
         .each_ref()
         .map(|of| profile(&problem, &best, of, &how).unwrap());
-    let targets = list.map(Target::Linear);
     let level = MisfitLimit::of(misfit + QUANTILE_95);
-    let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &list, &level, 1).unwrap();
     for (profile, band) in found.iter().zip(&bands) {
         let [low, high] = profile.interval.map(Option::unwrap);
         // Clarabel keeps rows about several parameters to 1e-9 of their size; along a level's root
