@@ -1,6 +1,6 @@
 //! Times of day and dates in fields of text, as seconds since the first of a column.
 
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 
 /// A time of day, with its date where it is stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,8 +26,10 @@ impl Clock {
     pub fn read(text: &str, day_first: bool) -> Option<Self> {
         let text = text.trim_matches(['"', '\'', ' ']);
         if let Some((number, unit)) = text.split_once(' ')
-            && let (Ok(number), Some(unit)) =
-                (number.parse::<f64>(), Unit::recognise(Quantity::Time, unit))
+            && let (Ok(number), Some(unit)) = (
+                number.parse::<f64>(),
+                Unit::recognise(Measurand::Time, unit),
+            )
         {
             return Some(Self {
                 day: None,

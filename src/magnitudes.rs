@@ -10,7 +10,7 @@
 //! back with the fewest changes is named.
 
 use crate::number_format::significant;
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 use kmcfit_core::internals::assessment::Implausible;
 use kmcfit_core::internals::signal::{Spectrum, median};
 use std::f64::consts::{PI, TAU};
@@ -42,7 +42,7 @@ const AROUND: [usize; 2] = [4, 10];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Magnitude {
     /// Displacement, velocity or acceleration.
-    pub quantity: Quantity,
+    pub quantity: Measurand,
     /// The unit in which it was read.
     pub unit: Unit,
     /// Amplitude in SI.
@@ -51,7 +51,7 @@ pub struct Magnitude {
 
 impl Magnitude {
     /// The magnitude of samples in SI: the deviation from their median within which 99 % of them lie.
-    pub fn of(quantity: Quantity, unit: Unit, values: &[f64]) -> Option<Self> {
+    pub fn of(quantity: Measurand, unit: Unit, values: &[f64]) -> Option<Self> {
         let values: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
         let last = values.len().checked_sub(1)?;
         let level = median(&*values);
@@ -78,8 +78,8 @@ impl Magnitude {
     /// Displacement, velocity and acceleration at a frequency (Hz).
     fn motion(self, frequency: f64) -> [f64; 3] {
         let order = match self.quantity {
-            Quantity::Velocity => 1,
-            Quantity::Acceleration => 2,
+            Measurand::Velocity => 1,
+            Measurand::Acceleration => 2,
             _ => 0,
         };
         let omega = TAU * frequency;
@@ -117,21 +117,21 @@ impl Magnitude {
 }
 
 /// Units in which the samples of a quantity are read in place of others, the most frequent error first.
-fn readings(quantity: Quantity, is_angular: bool) -> &'static [&'static str] {
+fn readings(quantity: Measurand, is_angular: bool) -> &'static [&'static str] {
     match (quantity, is_angular) {
-        (Quantity::Time, _) => &["ms", "s", "µs", "min"],
-        (Quantity::Displacement, false) => &["mm", "cm", "µm", "in", "m"],
-        (Quantity::Displacement, true) => &["deg", "mrad", "rad"],
-        (Quantity::Velocity, false) => &["mm/s", "cm/s", "in/s", "m/s"],
-        (Quantity::Velocity, true) => &["deg/s", "rad/s"],
-        (Quantity::Acceleration, false) => &["m/s²", "g", "mg", "mm/s²"],
-        (Quantity::Acceleration, true) => &["deg/s²", "rad/s²"],
-        (Quantity::Force, _) => &[],
+        (Measurand::Time, _) => &["ms", "s", "µs", "min"],
+        (Measurand::Displacement, false) => &["mm", "cm", "µm", "in", "m"],
+        (Measurand::Displacement, true) => &["deg", "mrad", "rad"],
+        (Measurand::Velocity, false) => &["mm/s", "cm/s", "in/s", "m/s"],
+        (Measurand::Velocity, true) => &["deg/s", "rad/s"],
+        (Measurand::Acceleration, false) => &["m/s²", "g", "mg", "mm/s²"],
+        (Measurand::Acceleration, true) => &["deg/s²", "rad/s²"],
+        (Measurand::Force, _) => &[],
     }
 }
 
 /// Other units of the same quantity and dimension.
-fn others(quantity: Quantity, unit: Unit) -> impl Iterator<Item = Unit> {
+fn others(quantity: Measurand, unit: Unit) -> impl Iterator<Item = Unit> {
     let names = readings(quantity, unit.is_angular()).iter();
     let units = names.filter_map(move |name| Unit::recognise(quantity, name));
     units.filter(move |other| *other != unit && !unit.is_arbitrary())
@@ -159,7 +159,7 @@ pub fn implausible(
     let acceleration = first.motion(frequency)[2];
     let implied = match first.unit.is_angular()
         || acceleration < USUAL_ACCELERATION
-        || first.quantity == Quantity::Acceleration
+        || first.quantity == Measurand::Acceleration
     {
         true => String::new(),
         false => format!(" ({} g)", significant(acceleration / GRAVITY, 2)),
@@ -208,7 +208,7 @@ fn reading(
     channels: &[Magnitude],
 ) -> Option<(Option<Unit>, f64, Vec<Magnitude>)> {
     let slower = time.into_iter().flat_map(|unit| {
-        others(Quantity::Time, unit)
+        others(Measurand::Time, unit)
             .map(move |other| (Some(other), frequency * unit.factor() / other.factor()))
     });
     let times = std::iter::once((None, frequency)).chain(slower);
@@ -238,7 +238,7 @@ fn reading(
 /// Frequency (Hz) of a narrow line of a spectrum that is mains hum if the times are read in another unit, with that unit.
 pub fn mains_hum(spectrum: &Spectrum, time: Unit) -> Option<(f64, Unit)> {
     let (density, resolution) = (spectrum.density(), spectrum.resolution());
-    let units = others(Quantity::Time, time).filter(|unit| unit.factor() < time.factor());
+    let units = others(Measurand::Time, time).filter(|unit| unit.factor() < time.factor());
     let mut lines =
         units.flat_map(|unit| MAINS.map(|mains| (mains * unit.factor() / time.factor(), unit)));
     lines.find(|(frequency, _)| {
@@ -263,11 +263,11 @@ pub fn mains_hum(spectrum: &Spectrum, time: Unit) -> Option<(f64, Unit)> {
 mod tests {
     use super::*;
 
-    fn unit(quantity: Quantity, text: &str) -> Unit {
+    fn unit(quantity: Measurand, text: &str) -> Unit {
         Unit::parse(quantity, text).expect("a unit")
     }
 
-    fn of(quantity: Quantity, text: &str, number: f64) -> Magnitude {
+    fn of(quantity: Measurand, text: &str, number: f64) -> Magnitude {
         let unit = unit(quantity, text);
         Magnitude {
             quantity,
@@ -277,14 +277,14 @@ mod tests {
     }
 
     fn judged(frequency: f64, channels: &[Magnitude]) -> Option<(String, Option<String>)> {
-        let found = implausible([frequency; 2], Some(unit(Quantity::Time, "s")), channels)?;
+        let found = implausible([frequency; 2], Some(unit(Measurand::Time, "s")), channels)?;
         Some((found.magnitudes, found.reading))
     }
 
     #[test]
     fn implausible_magnitudes_have_a_reading() {
-        let displacement = |number: f64| [of(Quantity::Displacement, "m", number)];
-        let acceleration = |number: f64| [of(Quantity::Acceleration, "g", number)];
+        let displacement = |number: f64| [of(Measurand::Displacement, "m", number)];
+        let acceleration = |number: f64| [of(Measurand::Acceleration, "g", number)];
         let text = |text: &str| Some(text.to_owned());
         // Milliseconds and millimetres read as s and m.
         assert_eq!(
@@ -320,7 +320,7 @@ mod tests {
         );
         // Degrees read as rad.
         assert_eq!(
-            judged(0.1, &[of(Quantity::Displacement, "rad", 20.0)]),
+            judged(0.1, &[of(Measurand::Displacement, "rad", 20.0)]),
             Some((
                 "20 rad at 0.1 Hz".into(),
                 text("the displacement read as deg gives 0.1 Hz and 20 deg")
@@ -332,14 +332,14 @@ mod tests {
     #[test]
     fn real_vibrations_are_plausible() {
         for (frequency, quantity, text, number) in [
-            (0.01, Quantity::Displacement, "m", 9.0),
-            (0.1, Quantity::Displacement, "m", 1.0),
-            (2.0, Quantity::Displacement, "mm", 40.0),
-            (5000.0, Quantity::Acceleration, "g", 2000.0),
-            (32768.0, Quantity::Displacement, "µm", 1e-3),
-            (30.0, Quantity::Acceleration, "g", 20.0),
-            (0.2, Quantity::Displacement, "deg", 30.0),
-            (12.0, Quantity::Velocity, "m/s", 3.0),
+            (0.01, Measurand::Displacement, "m", 9.0),
+            (0.1, Measurand::Displacement, "m", 1.0),
+            (2.0, Measurand::Displacement, "mm", 40.0),
+            (5000.0, Measurand::Acceleration, "g", 2000.0),
+            (32768.0, Measurand::Displacement, "µm", 1e-3),
+            (30.0, Measurand::Acceleration, "g", 20.0),
+            (0.2, Measurand::Displacement, "deg", 30.0),
+            (12.0, Measurand::Velocity, "m/s", 3.0),
         ] {
             assert_eq!(
                 judged(frequency, &[of(quantity, text, number)]),
@@ -352,7 +352,7 @@ mod tests {
     /// A line at 0.05 Hz over 400 periods beside noise: 50 Hz in ms. A decay at that frequency is broad; no unit is smaller than µs.
     #[test]
     fn mains_hum_shows_milliseconds() {
-        let seconds = unit(Quantity::Time, "s");
+        let seconds = unit(Measurand::Time, "s");
         let of = |values: &[f64]| Spectrum::of(values, 1.0).expect("it varies");
         let noise =
             |i: usize| f64::from((i as u32).wrapping_mul(2_654_435_761) >> 16) / 65536.0 - 0.5;
@@ -361,13 +361,13 @@ mod tests {
             .collect();
         assert_eq!(
             mains_hum(&of(&hum), seconds),
-            Some((0.05, unit(Quantity::Time, "ms")))
+            Some((0.05, unit(Measurand::Time, "ms")))
         );
         let decay =
             |i: usize| (-0.01 * TAU * 0.05 * i as f64).exp() * (TAU * 0.05 * i as f64).sin();
         let decay: Vec<f64> = (0..8000).map(|i| 0.02 * noise(i) + decay(i)).collect();
         assert_eq!(mains_hum(&of(&decay), seconds), None);
-        assert_eq!(mains_hum(&of(&hum), unit(Quantity::Time, "µs")), None);
+        assert_eq!(mains_hum(&of(&hum), unit(Measurand::Time, "µs")), None);
     }
 
     #[test]
@@ -375,8 +375,8 @@ mod tests {
         let mut values: Vec<f64> = (0..1000).map(|i| 2.0 + (f64::from(i)).sin()).collect();
         values[10] = 1e6;
         let found = Magnitude::of(
-            Quantity::Displacement,
-            unit(Quantity::Displacement, "m"),
+            Measurand::Displacement,
+            unit(Measurand::Displacement, "m"),
             &values,
         )
         .expect("samples");

@@ -1,27 +1,27 @@
 //! Quantities and parts of a system by the names of columns: the one table of names.
 
-use crate::units::Quantity;
+use crate::units::Measurand;
 
 /// Beginnings of words, and whole words that stand first in a name, in lower case, by quantity. The former take precedence.
-const NAMES: [(Quantity, &str, &str); 5] = [
+const NAMES: [(Measurand, &str, &str); 5] = [
     (
-        Quantity::Time,
+        Measurand::Time,
         "time zeit uhrzeit millis micros elapsed",
         "t date datum datenum matlab epoch jd mjd julian",
     ),
-    (Quantity::Acceleration, "acc beschl", "a ax ay az"),
+    (Measurand::Acceleration, "acc beschl", "a ax ay az"),
     (
-        Quantity::Velocity,
+        Measurand::Velocity,
         "vel gyr omega geschw speed",
         "v vx vy vz \u{3c9}",
     ),
     (
-        Quantity::Displacement,
+        Measurand::Displacement,
         "disp pos defl angle winkel ausl elong stroke theta phi lvdt",
         "roll pitch yaw weg y x z u s",
     ),
     (
-        Quantity::Force,
+        Measurand::Force,
         "force load torque kraft hammer",
         "f fx fy fz",
     ),
@@ -61,7 +61,7 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-fn begun(words: &[String]) -> Option<Quantity> {
+fn begun(words: &[String]) -> Option<Measurand> {
     words.iter().find_map(|word| {
         let mut all = NAMES.iter();
         let found =
@@ -74,18 +74,18 @@ fn begun(words: &[String]) -> Option<Quantity> {
 ///
 /// ```
 /// # use kmcfit::quantity_names::quantity_of;
-/// use kmcfit::units::Quantity;
-/// assert_eq!(quantity_of("linear_acceleration.z"), Some(Quantity::Acceleration));
-/// assert_eq!(quantity_of("gyro_z"), Some(Quantity::Velocity));
+/// use kmcfit::units::Measurand;
+/// assert_eq!(quantity_of("linear_acceleration.z"), Some(Measurand::Acceleration));
+/// assert_eq!(quantity_of("gyro_z"), Some(Measurand::Velocity));
 /// assert_eq!(quantity_of("ch 1"), None);
 /// ```
-pub fn quantity_of(name: &str) -> Option<Quantity> {
+pub fn quantity_of(name: &str) -> Option<Measurand> {
     let words = words(name);
     // The times of a force.
     if let [first, _, ..] = words.as_slice()
         && first == "t"
     {
-        return Some(Quantity::Time);
+        return Some(Measurand::Time);
     }
     begun(&words).or_else(|| {
         let first = words.first()?;
@@ -104,7 +104,7 @@ pub fn is_foreign(name: &str) -> bool {
     parts.next();
     let last = parts.rfind(|part| !part.is_empty());
     let has_unit = last.is_some_and(|unit| FOREIGN.contains(&unit));
-    let is_velocity = quantity == Some(Quantity::Velocity);
+    let is_velocity = quantity == Some(Measurand::Velocity);
     has_unit && (quantity.is_none() || is_velocity) || is_drive(name)
 }
 

@@ -13,7 +13,7 @@ use spelling::{names, product};
 
 /// Measured quantity of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub enum Measurand {
     /// Displacement or angle; SI: m or rad.
     Displacement,
     /// Velocity; SI: m/s or rad/s.
@@ -26,7 +26,7 @@ pub enum Quantity {
     Time,
 }
 
-impl From<ChannelKind> for Quantity {
+impl From<ChannelKind> for Measurand {
     fn from(kind: ChannelKind) -> Self {
         match kind {
             ChannelKind::Displacement => Self::Displacement,
@@ -36,7 +36,7 @@ impl From<ChannelKind> for Quantity {
     }
 }
 
-impl Quantity {
+impl Measurand {
     /// All kinds.
     pub const ALL: [Self; 5] = [
         Self::Displacement,
@@ -90,11 +90,11 @@ const VOLT: Powers = [0, 0, 0, 0, 1];
 /// A unit: `value in SI = factor * value`.
 ///
 /// ```
-/// use kmcfit::units::{Quantity, Unit};
-/// let unit = Unit::parse(Quantity::Acceleration, "[g]")?;
+/// use kmcfit::units::{Measurand, Unit};
+/// let unit = Unit::parse(Measurand::Acceleration, "[g]")?;
 /// assert_eq!((unit.symbol(), unit.factor()), ("g", 9.80665));
-/// assert_eq!(Unit::parse(Quantity::Acceleration, "m/s^2")?.symbol(), "m/s²");
-/// assert!(Unit::parse(Quantity::Force, "g").is_err());
+/// assert_eq!(Unit::parse(Measurand::Acceleration, "m/s^2")?.symbol(), "m/s²");
+/// assert!(Unit::parse(Measurand::Force, "g").is_err());
 /// # Ok::<(), kmcfit::error::InputError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,7 +124,7 @@ impl Symbol {
 
 impl Unit {
     /// The SI unit for translation.
-    pub fn si(kind: Quantity) -> Self {
+    pub fn si(kind: Measurand) -> Self {
         let symbol = kind.symbols()[0];
         Self {
             symbol: Symbol::of(symbol).unwrap_or(Symbol {
@@ -140,18 +140,18 @@ impl Unit {
     ///
     /// A unit is a product of names with prefixes and powers: `mm/s^2`, `cm s⁻²`, `kN·m`, `inches per second squared`. Brackets around it do
     /// not count; capitals do, since `mN` is not `MN`, but where all letters are capital.
-    pub fn recognise(kind: Quantity, text: &str) -> Option<Self> {
+    pub fn recognise(kind: Measurand, text: &str) -> Option<Self> {
         Self::any(text).filter(|unit| unit.is_of(kind))
     }
 
     /// The unit of any quantity that a text names.
     pub fn any(text: &str) -> Option<Self> {
-        let is_of_quantity = |unit: &Self| Quantity::ALL.iter().any(|kind| unit.is_of(*kind));
+        let is_of_quantity = |unit: &Self| Measurand::ALL.iter().any(|kind| unit.is_of(*kind));
         product(text).filter(is_of_quantity)
     }
 
-    pub(crate) fn is_of(&self, kind: Quantity) -> bool {
-        kind.dimensions().contains(&self.powers) || self.powers == VOLT && kind != Quantity::Time
+    pub(crate) fn is_of(&self, kind: Measurand) -> bool {
+        kind.dimensions().contains(&self.powers) || self.powers == VOLT && kind != Measurand::Time
     }
 
     /// The unit that a text names.
@@ -159,12 +159,12 @@ impl Unit {
     /// # Errors
     ///
     /// When there is no such unit of this kind; the place is an argument of the kind's name.
-    pub fn parse(kind: Quantity, text: &str) -> Result<Self, InputError> {
+    pub fn parse(kind: Measurand, text: &str) -> Result<Self, InputError> {
         Self::recognise(kind, text).ok_or_else(|| unknown(kind, text))
     }
 
     /// The symbols of usual units of a kind.
-    pub fn symbols(kind: Quantity) -> impl Iterator<Item = &'static str> {
+    pub fn symbols(kind: Measurand) -> impl Iterator<Item = &'static str> {
         kind.symbols().iter().copied()
     }
 
@@ -194,7 +194,7 @@ impl Unit {
 
     /// True for units of angles and torques.
     pub fn is_angular(&self) -> bool {
-        self.powers[3] != 0 || self.powers == Quantity::Force.dimensions()[1]
+        self.powers[3] != 0 || self.powers == Measurand::Force.dimensions()[1]
     }
 
     /// True for uncalibrated units: volts.
@@ -206,12 +206,12 @@ impl Unit {
 /// A unit with a factor: samples in multiples of it, as `50 g` for an accelerometer whose full scale is 50 g.
 ///
 /// ```
-/// use kmcfit::units::{Quantity, ScaledUnit};
-/// let scaled = ScaledUnit::parse(Quantity::Force, "250 N", None)?;
+/// use kmcfit::units::{Measurand, ScaledUnit};
+/// let scaled = ScaledUnit::parse(Measurand::Force, "250 N", None)?;
 /// assert_eq!((scaled.factor(), scaled.unit.symbol()), (250.0, "N"));
-/// let sensor = ScaledUnit::parse(Quantity::Acceleration, "100 mV/g", None)?;
+/// let sensor = ScaledUnit::parse(Measurand::Acceleration, "100 mV/g", None)?;
 /// assert!((sensor.factor() - 98.0665).abs() < 1e-12);
-/// assert!(ScaledUnit::parse(Quantity::Force, "0 N", None).is_err());
+/// assert!(ScaledUnit::parse(Measurand::Force, "0 N", None).is_err());
 /// # Ok::<(), kmcfit::error::InputError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -235,7 +235,7 @@ impl ScaledUnit {
     /// # Errors
     ///
     /// As [`Unit::parse`], and when the number is zero or not finite.
-    pub fn parse(kind: Quantity, text: &str, in_file: Option<Unit>) -> Result<Self, InputError> {
+    pub fn parse(kind: Measurand, text: &str, in_file: Option<Unit>) -> Result<Self, InputError> {
         let (scale, unit) = split_factor(text);
         if scale == 0.0 || !scale.is_finite() {
             let place = format!("unit of the {}", kind.name());
@@ -286,11 +286,11 @@ pub(crate) fn split_factor(text: &str) -> (f64, &str) {
 }
 
 /// The error for a text that is no unit of this kind.
-fn unknown(kind: Quantity, text: &str) -> InputError {
+fn unknown(kind: Measurand, text: &str) -> InputError {
     let error = InputError::argument(format!("unit of the {}", kind.name()), "unknown unit")
         .found(quote(text))
         .expected(one_of(Unit::symbols(kind)));
-    let of_other = Quantity::ALL
+    let of_other = Measurand::ALL
         .iter()
         .find(|&&other| Unit::recognise(other, text).is_some());
     if let Some(other) = of_other {
@@ -312,7 +312,7 @@ pub(crate) fn unbracketed(text: &str) -> &str {
     text
 }
 
-/// Symbols of SI for rotation, in the order of [`Quantity`].
+/// Symbols of SI for rotation, in the order of [`Measurand`].
 const ROTATION: [&str; 5] = ["rad", "rad/s", "rad/s²", "N m", "s"];
 
 /// Units of other quantities that occur in rows of units.
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn factors_are_those_of_the_definitions() {
-        use Quantity::{Acceleration, Displacement, Force, Time, Velocity};
+        use Measurand::{Acceleration, Displacement, Force, Time, Velocity};
         for (kind, texts, factor, symbol) in [
             (Displacement, "um|µm|[µm]|micron|micrometers", 1e-6, "µm"),
             (Displacement, "in|inch|inches|INCH", 0.0254, "in"),
@@ -396,8 +396,12 @@ mod tests {
                 assert_eq!(Unit::recognise(kind, unit.symbol()), Some(unit), "{text}");
             }
         }
-        assert!(Unit::parse(Quantity::Velocity, "V").unwrap().is_arbitrary());
-        assert!(!Unit::si(Quantity::Time).is_arbitrary());
+        assert!(
+            Unit::parse(Measurand::Velocity, "V")
+                .unwrap()
+                .is_arbitrary()
+        );
+        assert!(!Unit::si(Measurand::Time).is_arbitrary());
     }
 
     #[test]
@@ -416,7 +420,7 @@ mod tests {
             let of_file = of_file.and_then(|unit| Unit::recognise(kind, unit));
             ScaledUnit::parse(kind, text, of_file).unwrap().factor()
         };
-        use Quantity::{Acceleration, Displacement, Force};
+        use Measurand::{Acceleration, Displacement, Force};
         for (kind, text, of_file, factor) in [
             (Acceleration, "10 V/(m/s2)", None, 0.1),
             (Acceleration, "100 mV/g", Some("V"), 10.0 * GRAVITY),
@@ -435,12 +439,14 @@ mod tests {
     fn unknown_units_are_refused_with_a_hint() {
         let message = |kind, text| Unit::parse(kind, text).unwrap_err().to_string();
         assert_eq!(
-            message(Quantity::Time, "weeks"),
+            message(Measurand::Time, "weeks"),
             "unit of the time: unknown unit\n  found: `weeks`\n  expected: one of: s, ms, µs, min"
         );
-        assert!(message(Quantity::Force, "m/s²").ends_with("hint: this is a unit of acceleration"));
-        assert!(message(Quantity::Force, "newtn").ends_with("hint: did you mean `N`?"));
-        assert!(message(Quantity::Force, "kn").ends_with("hint: did you mean `kN`?"));
+        assert!(
+            message(Measurand::Force, "m/s²").ends_with("hint: this is a unit of acceleration")
+        );
+        assert!(message(Measurand::Force, "newtn").ends_with("hint: did you mean `N`?"));
+        assert!(message(Measurand::Force, "kn").ends_with("hint: did you mean `kN`?"));
     }
 
     #[test]

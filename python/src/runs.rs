@@ -9,7 +9,7 @@ use kmcfit::quantity_names::quantity_of;
 use kmcfit::report::compare::{ComparedRun, Comparison};
 use kmcfit::report::{CsvTable, ForcedPredictions, json, predict};
 use kmcfit::tables::Table;
-use kmcfit::units::{Quantity, Unit};
+use kmcfit::units::{Measurand, Unit};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
 use pyo3::prelude::*;
@@ -48,13 +48,13 @@ pub fn scaffold(py: Python<'_>, paths: Vec<PathBuf>) -> PyResult<String> {
 pub fn quantity(name: &str, unit: &str) -> Option<&'static str> {
     let by_name = quantity_of(name);
     let of =
-        |kind: &Quantity| Unit::recognise(*kind, unit).is_some_and(|unit| !unit.is_arbitrary());
-    let by_unit = Quantity::ALL.into_iter().find(of);
+        |kind: &Measurand| Unit::recognise(*kind, unit).is_some_and(|unit| !unit.is_arbitrary());
+    let by_unit = Measurand::ALL.into_iter().find(of);
     let found = match unit.trim() {
         "" => by_name,
         _ => by_name.filter(of).or(by_unit),
     };
-    found.map(Quantity::name)
+    found.map(Measurand::name)
 }
 
 /// The numeric columns of a data file, each with its name.

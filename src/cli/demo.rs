@@ -154,13 +154,13 @@ fn row(label: &str, truth: &str, numbers: impl Iterator<Item = String>) -> Strin
 const EXACT: f64 = 1e-6;
 
 /// A row of the table: quantity with its unit, that of the true system, and that of a fit.
-type Quantity = (
+type TableRow = (
     &'static str,
     &'static str,
     fn(&Run, &Measures) -> Option<f64>,
 );
 
-const QUANTITIES: [Quantity; 8] = [
+const QUANTITIES: [TableRow; 8] = [
     ("fit of the displacement (%)", "100", |_, m| m.worst_fit),
     ("mass at 0 s (kg)", "1", |run, _| {
         run.coefficients.inertias[0].first().copied()

@@ -7,7 +7,7 @@ use super::names::{factor_of_time, letters};
 use super::{FileChannel, Sampling, last_part};
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
-use crate::units::Quantity;
+use crate::units::Measurand;
 
 /// Deviation from whole steps by the rounding of times.
 const ALIGNED: f64 = 1e-5;
@@ -16,7 +16,7 @@ const EVEN: f64 = 0.01;
 
 fn is_time(channel: &FileChannel) -> bool {
     channel.values.windows(2).all(|pair| pair[1] > pair[0])
-        && quantity_of(last_part(&channel.name)) == Some(Quantity::Time)
+        && quantity_of(last_part(&channel.name)) == Some(Measurand::Time)
 }
 
 /// First time and step of equally spaced times in this unit.

@@ -1,6 +1,6 @@
 //! Meaning of the names of attributes, properties, small variables and lines beside samples: the one table of these names.
 
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 
 /// Meaning of a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,7 +100,7 @@ pub(super) fn factor_of_rate(unit: &str) -> Option<f64> {
 /// Factor of a unit of times to s, also with a number as in `1e-4 s`.
 pub(super) fn factor_of_time(unit: &str) -> Option<f64> {
     let (number, unit) = crate::units::split_factor(unit);
-    Some(number * Unit::recognise(Quantity::Time, unit)?.factor())
+    Some(number * Unit::recognise(Measurand::Time, unit)?.factor())
 }
 
 /// A name, as it is understood.

@@ -7,7 +7,7 @@ use super::{Channels, Sampling};
 use crate::error::InputError;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 
 /// Length of the examined beginning of a file, bytes.
 const BEGINNING: usize = 1 << 14;
@@ -221,9 +221,10 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
 }
 
 /// The quantity of a unit other than a time.
-fn unit_kind(unit: &str) -> Option<Quantity> {
-    let is_of = |kind: &Quantity| *kind != Quantity::Time && Unit::recognise(*kind, unit).is_some();
-    Quantity::ALL.into_iter().find(is_of)
+fn unit_kind(unit: &str) -> Option<Measurand> {
+    let is_of =
+        |kind: &Measurand| *kind != Measurand::Time && Unit::recognise(*kind, unit).is_some();
+    Measurand::ALL.into_iter().find(is_of)
 }
 
 /// Factor and unit of `3920(gal)/6182761`.

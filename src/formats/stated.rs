@@ -9,7 +9,7 @@ use super::{Channels, FileChannel, Sampling, clocks, last_part};
 use crate::clock::Clock;
 use crate::headings::split_unit;
 use crate::quantity_names::quantity_of;
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 
 /// Most numbers of a variable that states something.
 const SMALL: usize = 16;
@@ -114,7 +114,7 @@ impl Fact {
 /// Samples of which something is stated.
 pub(crate) struct Subject<'a> {
     pub name: &'a str,
-    pub quantity: Option<Quantity>,
+    pub quantity: Option<Measurand>,
     /// Letters of the names of all samples.
     pub all: &'a BTreeSet<String>,
     /// True for a format that defines `scale_factor` and `add_offset`.
@@ -174,7 +174,7 @@ impl Subject<'_> {
                 .last();
             last.map_or("", |(fact, _)| fact.text())
         };
-        let is_time = self.quantity == Some(Quantity::Time);
+        let is_time = self.quantity == Some(Measurand::Time);
         let concerned = facts
             .clone()
             .map(|(fact, is_near)| (fact, is_near, self.of(&fact.name)));
@@ -245,7 +245,7 @@ impl Subject<'_> {
     fn fits(&self, unit: &str) -> bool {
         match self.quantity {
             Some(quantity) => Unit::recognise(quantity, unit).is_some(),
-            None => Unit::any(unit).is_some_and(|unit| !unit.is_of(Quantity::Time)),
+            None => Unit::any(unit).is_some_and(|unit| !unit.is_of(Measurand::Time)),
         }
     }
 }

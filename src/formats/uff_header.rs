@@ -2,7 +2,7 @@
 //!
 //! Fields stand at fixed columns. Reference: SDRC Universal File Formats, data sets 58 and 164.
 
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 
 /// Number of lines of the header.
 pub(super) const LINES: usize = 11;
@@ -149,17 +149,17 @@ fn place(line: &str) -> String {
 }
 
 /// Name and quantity of a type of ordinates.
-fn quantity(code: u32) -> (&'static str, Option<Quantity>) {
+fn quantity(code: u32) -> (&'static str, Option<Measurand>) {
     match code {
-        8 => ("displacement", Some(Quantity::Displacement)),
-        9 | 13 => ("force", Some(Quantity::Force)),
-        11 => ("velocity", Some(Quantity::Velocity)),
-        12 => ("acceleration", Some(Quantity::Acceleration)),
+        8 => ("displacement", Some(Measurand::Displacement)),
+        9 | 13 => ("force", Some(Measurand::Force)),
+        11 => ("velocity", Some(Measurand::Velocity)),
+        12 => ("acceleration", Some(Measurand::Acceleration)),
         2 => ("stress", None),
         3 => ("strain", None),
         5 => ("temperature", None),
         15 => ("pressure", None),
-        17 => ("time", Some(Quantity::Time)),
+        17 => ("time", Some(Measurand::Time)),
         _ => ("channel", None),
     }
 }
@@ -198,21 +198,21 @@ fn content(kind: u32, abscissa: u32, is_complex: bool) -> Option<String> {
 
 impl UnitFactors {
     /// Unit of a quantity in the file: a factor and a symbol, of SI unless the factor is 1.
-    fn scaled(self, quantity: Quantity) -> (f64, Option<String>) {
+    fn scaled(self, quantity: Measurand) -> (f64, Option<String>) {
         let (factor, symbols): (f64, &[(f64, &str)]) = match quantity {
-            Quantity::Force => (self.force, &FORCES),
+            Measurand::Force => (self.force, &FORCES),
             _ => (self.length, &LENGTHS),
         };
         let known = symbols
             .iter()
             .find(|(of, _)| (factor / of - 1.0).abs() < SAME);
         let after = match quantity {
-            Quantity::Velocity => "/s",
-            Quantity::Acceleration => "/s²",
+            Measurand::Velocity => "/s",
+            Measurand::Acceleration => "/s²",
             _ => "",
         };
         match (quantity, known) {
-            (Quantity::Time, _) => (1.0, Some("s".to_owned())),
+            (Measurand::Time, _) => (1.0, Some("s".to_owned())),
             (_, Some((_, symbol))) => (1.0, Some(format!("{symbol}{after}"))),
             (_, None) => (1.0 / factor, Some(Unit::si(quantity).symbol().to_owned())),
         }
@@ -245,17 +245,17 @@ mod tests {
     fn units_follow_from_factors() {
         let units = |length, force| UnitFactors { length, force };
         for (factors, quantity, symbol) in [
-            (units(1.0, 1.0), Quantity::Acceleration, "m/s²"),
-            (units(1000.0, 1000.0), Quantity::Velocity, "mm/s"),
-            (units(1000.0, 1000.0), Quantity::Force, "mN"),
-            (units(39.37008, 0.2248089), Quantity::Displacement, "in"),
-            (units(39.37008, 0.2248089), Quantity::Force, "lbf"),
-            (units(1.0, 0.101_971_6), Quantity::Force, "kgf"),
+            (units(1.0, 1.0), Measurand::Acceleration, "m/s²"),
+            (units(1000.0, 1000.0), Measurand::Velocity, "mm/s"),
+            (units(1000.0, 1000.0), Measurand::Force, "mN"),
+            (units(39.37008, 0.2248089), Measurand::Displacement, "in"),
+            (units(39.37008, 0.2248089), Measurand::Force, "lbf"),
+            (units(1.0, 0.101_971_6), Measurand::Force, "kgf"),
         ] {
             let unit = (1.0, Some(symbol.to_owned()));
             assert_eq!(factors.scaled(quantity), unit);
         }
-        let other = units(4.0, 1.0).scaled(Quantity::Velocity);
+        let other = units(4.0, 1.0).scaled(Measurand::Velocity);
         assert_eq!(other, (0.25, Some("m/s".to_owned())));
     }
 

@@ -17,7 +17,7 @@ const EXACT: f64 = 1e-7;
 pub struct AnswerRow {
     /// Name in `estimates` of the result document.
     pub key: String,
-    /// Quantity in words, with its symbol.
+    /// Measurand in words, with its symbol.
     pub quantity: String,
     /// Mean over the record.
     pub estimate: String,

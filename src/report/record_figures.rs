@@ -13,7 +13,7 @@ const PLAIN: i32 = 1;
 /// A measured and a modelled series at equal times, in the unit of the channel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SeriesPair<'a> {
-    /// Quantity with its symbol, and unit.
+    /// Measurand with its symbol, and unit.
     pub label: (&'a str, &'a str),
     /// Time between samples, s.
     pub spacing: f64,

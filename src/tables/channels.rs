@@ -12,7 +12,7 @@ use crate::memory;
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
-use crate::units::Quantity;
+use crate::units::Measurand;
 
 /// Names of the column of times that is made from a sampling rate or interval; the second where a channel has the first.
 const TIME: [&str; 2] = ["time", "sampling time"];
@@ -260,7 +260,10 @@ impl Table {
         let file = self.path.file_stem().and_then(|stem| stem.to_str());
         let is_motion = |file: &&str| {
             let quantity = quantity_of(file);
-            matches!(quantity, Some(Quantity::Acceleration | Quantity::Velocity))
+            matches!(
+                quantity,
+                Some(Measurand::Acceleration | Measurand::Velocity)
+            )
         };
         let is_axis = axes.contains(&header) && axes.iter().all(has);
         file.filter(is_motion).filter(|_| is_axis).unwrap_or(header)

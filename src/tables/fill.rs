@@ -17,7 +17,7 @@ use crate::formats::{Meaning, meaning};
 use crate::number_format::count;
 use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 use kmcfit_core::internals::threads::both;
 
 /// Most columns: each takes some hundred bytes beside its fields.
@@ -271,7 +271,7 @@ fn check_headers(
     }
     for (index, name) in headers.iter().enumerate() {
         let before = headers.iter().take(index).position(|other| other == name);
-        let is_time = quantity_of(name) == Some(Quantity::Time) && index + 1 < headers.len();
+        let is_time = quantity_of(name) == Some(Measurand::Time) && index + 1 < headers.len();
         if let (Some(first), false) = (before, name.is_empty() || is_time) {
             return Err(error(format!("two columns have the name {}", quote(name)))
                 .found(format!("columns {} and {}", first + 1, index + 1))

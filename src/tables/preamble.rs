@@ -7,7 +7,7 @@ use super::detect::DELIMITERS;
 use crate::formats::{Fact, Meaning, Subject, letters, meaning};
 use crate::headings::split_unit;
 use crate::quantity_names::quantity_of;
-use crate::units::{Quantity, Unit, unbracketed};
+use crate::units::{Measurand, Unit, unbracketed};
 
 /// Longest line that states something in words, letters.
 const LONGEST: usize = 60;
@@ -34,7 +34,7 @@ impl Table {
         let all: BTreeSet<String> = names.iter().map(|name| letters(name)).collect();
         let has_key = names
             .first()
-            .is_some_and(|name| quantity_of(name) == Some(Quantity::Time))
+            .is_some_and(|name| quantity_of(name) == Some(Measurand::Time))
             || self
                 .columns
                 .first()

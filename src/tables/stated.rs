@@ -4,7 +4,7 @@ use super::Table;
 use crate::error::InputError;
 use crate::headings::{REMARKS, range_of, split_unit};
 use crate::text_io::quote;
-use crate::units::{Quantity, Unit, unbracketed};
+use crate::units::{Measurand, Unit, unbracketed};
 
 /// Part of a range above which samples are outside it.
 const EXCESS: f64 = 1.5;
@@ -27,13 +27,13 @@ impl<'a> StatedUnit<'a> {
     }
 
     /// The unit of this quantity in the row of units or after the name.
-    pub fn explicit(&self, kind: Quantity) -> Option<Unit> {
+    pub fn explicit(&self, kind: Measurand) -> Option<Unit> {
         let unit = |text: Option<&str>| Unit::recognise(kind, text?);
         unit(self.row).or_else(|| unit(self.header))
     }
 
     /// The unit of this quantity at the end of the name, as in `y_mm` and `a_m_per_s2`, or before remarks and numbers, as in `acc_g_filtered`.
-    pub fn suffix(&self, kind: Quantity) -> Option<Unit> {
+    pub fn suffix(&self, kind: Measurand) -> Option<Unit> {
         let mut name = self.name;
         while let Some((before, word)) = name.rsplit_once('_')
             && is_remark(word)
@@ -48,7 +48,7 @@ impl<'a> StatedUnit<'a> {
     }
 
     /// The unit of this quantity as the last word of the name but for remarks, as in `Force N`, `acc.g`, `accelerationInG`, `acc, g, ch 3`.
-    pub fn last_word(&self, kind: Quantity) -> Option<Unit> {
+    pub fn last_word(&self, kind: Measurand) -> Option<Unit> {
         let unit = |word: &str| Unit::recognise(kind, word);
         let (_, last) = self.name.rsplit_once(' ').unwrap_or_default();
         let words = self.name.split([' ', '_', '.', '-', ',', '*']);
@@ -74,7 +74,7 @@ impl<'a> StatedUnit<'a> {
         let (Some(row), Some(header)) = (self.row, self.header) else {
             return false;
         };
-        let units = |text| Quantity::ALL.map(|kind| Unit::recognise(kind, text));
+        let units = |text| Measurand::ALL.map(|kind| Unit::recognise(kind, text));
         let (row, header) = (units(row), units(header));
         let is_unit = |units: &[Option<Unit>]| units.iter().any(Option::is_some);
         let agree = row.iter().zip(&header).any(|(a, b)| a.is_some() && a == b);
@@ -157,19 +157,19 @@ mod tests {
     #[test]
     fn units_are_read_at_the_ends_of_names() {
         for (name, kind, symbol) in [
-            ("y_mm", Quantity::Displacement, Some("mm")),
-            ("left_y_mm", Quantity::Displacement, Some("mm")),
-            ("t_ms", Quantity::Time, Some("ms")),
-            ("a_m_per_s2", Quantity::Acceleration, Some("m/s²")),
-            ("v_mm_per_s", Quantity::Velocity, Some("mm/s")),
-            ("M_N_m", Quantity::Force, Some("N m")),
-            ("y", Quantity::Displacement, None),
-            ("mm", Quantity::Displacement, None),
-            ("y_raw", Quantity::Displacement, None),
-            ("Acc_g_filtered", Quantity::Acceleration, Some("g")),
-            ("Accel_gs", Quantity::Acceleration, Some("g")),
-            ("force_N_2", Quantity::Force, Some("N")),
-            ("y_mm", Quantity::Time, None),
+            ("y_mm", Measurand::Displacement, Some("mm")),
+            ("left_y_mm", Measurand::Displacement, Some("mm")),
+            ("t_ms", Measurand::Time, Some("ms")),
+            ("a_m_per_s2", Measurand::Acceleration, Some("m/s²")),
+            ("v_mm_per_s", Measurand::Velocity, Some("mm/s")),
+            ("M_N_m", Measurand::Force, Some("N m")),
+            ("y", Measurand::Displacement, None),
+            ("mm", Measurand::Displacement, None),
+            ("y_raw", Measurand::Displacement, None),
+            ("Acc_g_filtered", Measurand::Acceleration, Some("g")),
+            ("Accel_gs", Measurand::Acceleration, Some("g")),
+            ("force_N_2", Measurand::Force, Some("N")),
+            ("y_mm", Measurand::Time, None),
         ] {
             let table = table(&format!("{name},z\n1,2\n2,3\n"));
             let unit = table.stated_unit(0).suffix(kind);

@@ -14,7 +14,7 @@ use crate::error::{InputError, Location};
 use crate::formats;
 use crate::number_format::significant;
 use crate::text_io::{LONGEST_TABLE, check_lines, read_bytes, read_bytes_from};
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 
 /// Span of dates above which day and month may be exchanged, s.
 const WEEKS: f64 = 20.0 * DAY;
@@ -349,7 +349,7 @@ impl Table {
             table.name_by_comments(&text, layout.delimiter);
         }
         // A row of units without names begins with that of the times.
-        let is_time = |name: &String| Unit::recognise(Quantity::Time, name).is_some();
+        let is_time = |name: &String| Unit::recognise(Measurand::Time, name).is_some();
         let mut others = table.headers.iter().skip(1);
         if table.units.is_empty()
             && table.headers.first().is_some_and(is_time)

@@ -8,7 +8,7 @@ use crate::headings::split_unit;
 use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 use kmcfit_core::internals::signal::median;
 
 /// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.
@@ -112,7 +112,7 @@ impl Table {
 
     /// The unit of times that a column states; of a name of times also that at its end, else that of SI.
     pub(crate) fn unit_of_times(&self, index: usize) -> Option<Unit> {
-        let (stated, kind) = (self.stated_unit(index), Quantity::Time);
+        let (stated, kind) = (self.stated_unit(index), Measurand::Time);
         stated.explicit(kind).or_else(|| {
             let is_named = quantity_of(self.quantity_name(index)) == Some(kind);
             (is_named && stated.text().is_none()).then_some(())?;
@@ -150,7 +150,7 @@ impl Table {
     fn unit_of_magnitude(&self, index: usize) -> Option<&'static str> {
         let name = self.quantity_name(index);
         let stated = self.stated_unit(index);
-        let kind = Quantity::Time;
+        let kind = Measurand::Time;
         let is_stated =
             stated.text().is_some() || stated.suffix(kind).or(stated.last_word(kind)).is_some();
         (quantity_of(name) == Some(kind) && !is_stated).then_some(())?;

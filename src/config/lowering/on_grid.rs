@@ -3,7 +3,7 @@
 use super::Place;
 use crate::error::InputError;
 use crate::tables::{Table, TableFormat, increasing};
-use crate::units::Quantity;
+use crate::units::Measurand;
 use kmcfit_core::internals::system::Grid;
 
 /// Column of times in files of functions.
@@ -51,7 +51,7 @@ pub(super) fn column_on_grid(
 /// Refuses times whose stated unit is not s.
 fn check_seconds(table: &Table) -> Result<(), InputError> {
     let index = table.find(&TIME_COLUMN.into())?;
-    let unit = table.stated_unit(index).explicit(Quantity::Time);
+    let unit = table.stated_unit(index).explicit(Measurand::Time);
     match unit.filter(|unit| unit.factor() != 1.0) {
         None => Ok(()),
         Some(unit) => Err(

@@ -320,7 +320,7 @@ impl ColumnAssignment {
     }
 }
 
-/// Quantity and unit of a column as its name and stated unit give them, and true if the file states the unit.
+/// Measurand and unit of a column as its name and stated unit give them, and true if the file states the unit.
 pub fn recognised(table: &Table, index: usize) -> Option<(Role, Unit, bool)> {
     known(table, index).map(|column| (column.role, column.unit, column.has_unit))
 }

@@ -2,7 +2,7 @@
 
 use crate::quantity_names::{is_foreign, quantity_of, without_base};
 use crate::tables::Table;
-use crate::units::{Quantity, ScaledUnit, Unit};
+use crate::units::{Measurand, ScaledUnit, Unit};
 
 /// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,23 +42,23 @@ impl Role {
     }
 
     /// The measured quantity.
-    pub fn kind(self) -> Quantity {
+    pub fn kind(self) -> Measurand {
         match self {
-            Role::Time => Quantity::Time,
-            Role::Displacement | Role::BaseDisplacement => Quantity::Displacement,
-            Role::Velocity => Quantity::Velocity,
-            Role::Acceleration | Role::BaseAcceleration => Quantity::Acceleration,
-            Role::Force => Quantity::Force,
+            Role::Time => Measurand::Time,
+            Role::Displacement | Role::BaseDisplacement => Measurand::Displacement,
+            Role::Velocity => Measurand::Velocity,
+            Role::Acceleration | Role::BaseAcceleration => Measurand::Acceleration,
+            Role::Force => Measurand::Force,
         }
     }
 
-    fn of(kind: Quantity) -> Self {
+    fn of(kind: Measurand) -> Self {
         match kind {
-            Quantity::Time => Role::Time,
-            Quantity::Displacement => Role::Displacement,
-            Quantity::Velocity => Role::Velocity,
-            Quantity::Acceleration => Role::Acceleration,
-            Quantity::Force => Role::Force,
+            Measurand::Time => Role::Time,
+            Measurand::Displacement => Role::Displacement,
+            Measurand::Velocity => Role::Velocity,
+            Measurand::Acceleration => Role::Acceleration,
+            Measurand::Force => Role::Force,
         }
     }
 

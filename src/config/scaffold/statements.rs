@@ -5,7 +5,7 @@ use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::tables::{ColumnName, Table};
 use crate::text_io::{one_of, quote};
-use crate::units::{Quantity, ScaledUnit, Unit, split_factor};
+use crate::units::{Measurand, ScaledUnit, Unit, split_factor};
 use kmcfit_core::internals::functions::CoefficientKind;
 
 /// Remedy for a column of times that cannot be used.
@@ -186,8 +186,9 @@ impl ColumnStatements {
                     .expected(one_of(labels.iter().map(String::as_str)))
                     .hint_if(hint)
             })?;
-            let is_length =
-                || known(table, index).is_some_and(|own| own.role.kind() == Quantity::Displacement);
+            let is_length = || {
+                known(table, index).is_some_and(|own| own.role.kind() == Measurand::Displacement)
+            };
             let own = || {
                 known(table, index)
                     .map(|own| own.role)
@@ -303,7 +304,7 @@ impl ColumnStatements {
 }
 
 /// A unit with a factor, for the option `--units`.
-fn parse(kind: Quantity, text: &str, in_file: Option<Unit>) -> Result<ScaledUnit, InputError> {
+fn parse(kind: Measurand, text: &str, in_file: Option<Unit>) -> Result<ScaledUnit, InputError> {
     ScaledUnit::parse(kind, text, in_file).map_err(|error| InputError {
         place: InputError::argument("--units", "").place,
         problem: format!("{} of the {}", error.problem, kind.name()),
@@ -312,7 +313,7 @@ fn parse(kind: Quantity, text: &str, in_file: Option<Unit>) -> Result<ScaledUnit
 }
 
 fn unknown_unit(text: &str) -> InputError {
-    let symbols = || Quantity::ALL.into_iter().flat_map(Unit::symbols);
+    let symbols = || Measurand::ALL.into_iter().flat_map(Unit::symbols);
     InputError::argument("--units", "unknown unit")
         .found(quote(text))
         .expected(one_of(symbols()))

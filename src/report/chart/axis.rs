@@ -29,7 +29,7 @@ pub enum Scale {
 /// An axis: quantity, unit, scale and range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// Quantity and symbol, as in `time t`.
+    /// Measurand and symbol, as in `time t`.
     pub label: String,
     /// Unit, as in `s`; empty for a pure number.
     pub unit: String,

@@ -220,8 +220,8 @@ fn in_shown_units(document: &ResultDocument) -> Vec<Quantity> {
     let velocity = unit_of("velocity").or(displacement.as_ref().map(|unit| format!("{unit}/s")));
     let shown = |parameter: &Quantity| {
         let (quantity, unit) = match parameter.unit.as_str() {
-            "m" | "rad" => (units::Quantity::Displacement, displacement.as_ref()?),
-            "m/s" | "rad/s" => (units::Quantity::Velocity, velocity.as_ref()?),
+            "m" | "rad" => (units::Measurand::Displacement, displacement.as_ref()?),
+            "m/s" | "rad/s" => (units::Measurand::Velocity, velocity.as_ref()?),
             _ => return None,
         };
         Unit::recognise(quantity, unit).filter(|unit| !unit.is_arbitrary())

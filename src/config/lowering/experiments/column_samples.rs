@@ -11,7 +11,7 @@ use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, lines_in_words,
     repeated_times, sample_rates, without_rounding,
 };
-use crate::units::{Quantity, Unit};
+use crate::units::{Measurand, Unit};
 use kmcfit_core::model::ColumnId;
 use kmcfit_core::model::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use kmcfit_core::model::{OneOrList, ScalarOr};
@@ -82,7 +82,7 @@ pub struct ColumnRequest<'a> {
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     /// Measured quantity.
-    pub kind: Quantity,
+    pub kind: Measurand,
     /// The column.
     pub column: &'a ColumnRef,
     /// Unit given in the model file.
@@ -149,8 +149,8 @@ pub fn read(wanted: &ColumnRequest, notes: &mut RecordNotes) -> Result<ColumnSam
     // Responses are used at times at which every channel of the file has a sample before and after.
     let late = table.late(index);
     let lates = || (0..table.width()).map(|i| table.late(i));
-    let is_response = Quantity::ALL.iter().any(|kind| kind.name() == wanted.name)
-        && wanted.kind != Quantity::Force;
+    let is_response = Measurand::ALL.iter().any(|kind| kind.name() == wanted.name)
+        && wanted.kind != Measurand::Force;
     if is_response && inside.len() > 2 {
         inside.start += usize::from(inside.start == 0 && lates().any(|other| other > late));
         let is_last = inside.end == times.values.len();
@@ -370,7 +370,7 @@ fn times(
     let column = QuantityColumn {
         at,
         name: "time",
-        kind: Quantity::Time,
+        kind: Measurand::Time,
         given: spec.units.as_ref().and_then(|u| u.time.as_ref()),
         table,
         index,

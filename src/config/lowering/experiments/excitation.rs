@@ -6,7 +6,7 @@ use super::data_facts::{RecordNotes, USED};
 use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::lowering::Place;
 use crate::error::InputError;
-use crate::units::Quantity;
+use crate::units::Measurand;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use kmcfit_core::model::{ExperimentSpec, ForceShape, ForceSpec};
@@ -32,7 +32,7 @@ pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Input, InputEr
             let wanted = ColumnRequest {
                 entry,
                 name: "force",
-                kind: Quantity::Force,
+                kind: Measurand::Force,
                 column,
                 unit: units.and_then(|u| u.force.as_ref()),
                 beside: None,
@@ -68,8 +68,8 @@ fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
         }
-        (Some(column), None) => (column, Quantity::Acceleration),
-        (None, Some(column)) => (column, Quantity::Displacement),
+        (Some(column), None) => (column, Measurand::Acceleration),
+        (None, Some(column)) => (column, Measurand::Displacement),
     };
     let wanted = |name, unit, kind| ColumnRequest {
         entry,
@@ -79,7 +79,7 @@ fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>
         unit,
         beside: None,
     };
-    if kind == Quantity::Acceleration {
+    if kind == Measurand::Acceleration {
         let unit = units.and_then(|u| u.base_acceleration.as_ref());
         let wanted = wanted("base_acceleration", unit, kind);
         let meant = interpolation.unwrap_or_default();

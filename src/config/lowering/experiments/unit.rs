@@ -4,7 +4,7 @@ use crate::config::lowering::Place;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
-use crate::units::{Quantity, ScaledUnit, Unit};
+use crate::units::{Measurand, ScaledUnit, Unit};
 use kmcfit_core::internals::assessment::Severity;
 use serde_json::json;
 
@@ -17,7 +17,7 @@ pub(super) struct QuantityColumn<'a> {
     pub at: &'a Place<'a>,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
-    pub kind: Quantity,
+    pub kind: Measurand,
     /// Unit given in the model file.
     pub given: Option<&'a String>,
     pub table: &'a Table,
