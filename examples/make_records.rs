@@ -74,10 +74,13 @@ impl Run<'_> {
                 force: self.force.map_or(0.0, |f| f(self.time(i))),
                 base: self.base.map_or(0.0, |b| b(self.time(i))),
             };
-            let place = TimePoint::node(FINE * i, nodes);
+            let position = TimePoint::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
             let excitation = Some(&excitation);
-            observe(&system, kind, &nodal, excitation, &response, place, around).value
+            observe(
+                &system, kind, &nodal, excitation, &response, position, around,
+            )
+            .value
         });
         let acceleration = acceleration.collect();
         (

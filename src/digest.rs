@@ -110,17 +110,17 @@ mod tests {
     #[test]
     fn digests_of_bytes_and_files_agree() {
         assert_eq!(digest(b"abc"), ABC);
-        let place = tempfile::tempdir().expect("a folder");
-        let path = place.path().join("a.txt");
+        let location = tempfile::tempdir().expect("a folder");
+        let path = location.path().join("a.txt");
         std::fs::write(&path, "abc").expect("written");
         assert_eq!(digest_of_file(&path).expect("a digest"), ABC);
-        assert!(digest_of_file(place.path()).is_err());
+        assert!(digest_of_file(location.path()).is_err());
     }
 
     #[test]
     fn a_file_that_grows_is_refused() {
-        let place = tempfile::tempdir().expect("a folder");
-        let path = place.path().join("a.csv");
+        let location = tempfile::tempdir().expect("a folder");
+        let path = location.path().join("a.csv");
         std::fs::write(&path, "abc").expect("written");
         let files = ReadFiles::default();
         files.read(&path, "a table", 100).expect("read");

@@ -88,7 +88,7 @@ impl fmt::Display for Location {
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputError {
     /// Location.
-    pub place: Location,
+    pub location: Location,
     /// Dotted path of the key, as in `functions.mass.start`.
     pub key: Option<String>,
     /// The problem, as a sentence without a full stop.
@@ -102,10 +102,10 @@ pub struct InputError {
 }
 
 impl InputError {
-    /// An error at `place` with its problem.
-    pub fn new(place: Location, problem: impl Into<String>) -> Self {
+    /// An error at `location` with its problem.
+    pub fn new(location: Location, problem: impl Into<String>) -> Self {
         Self {
-            place,
+            location,
             key: None,
             problem: problem.into(),
             found: None,
@@ -179,7 +179,7 @@ impl InputError {
 
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut message = format!("{}: ", self.place);
+        let mut message = format!("{}: ", self.location);
         if let Some(key) = &self.key {
             message += &format!("{key}: ");
         }

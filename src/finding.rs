@@ -63,9 +63,9 @@ impl Finding {
 
     /// The finding about a place: a key or an experiment of the model file.
     #[must_use]
-    pub fn at(mut self, place: &str) -> Self {
-        self.text = format!("{place}: {}", self.text);
-        self.with("place", place)
+    pub fn at(mut self, position: &str) -> Self {
+        self.text = format!("{position}: {}", self.text);
+        self.with("place", position)
     }
 
     /// The finding with another quantity; one that JSON cannot hold is `null`.

@@ -56,8 +56,8 @@ impl Magnitude {
         let last = values.len().checked_sub(1)?;
         let level = median(&*values);
         let mut away: Vec<f64> = values.iter().map(|x| (x - level).abs()).collect();
-        let place = (WITHIN * last as f64) as usize;
-        let amplitude = *away.select_nth_unstable_by(place, f64::total_cmp).1;
+        let position = (WITHIN * last as f64) as usize;
+        let amplitude = *away.select_nth_unstable_by(position, f64::total_cmp).1;
         Some(Self {
             quantity,
             unit,
@@ -154,8 +154,8 @@ pub fn implausible(
     channels: &[Magnitude],
 ) -> Option<ImplausibleMagnitudes> {
     let is_possible = |c: &Magnitude| c.is_possible(frequency) || c.is_possible(middle);
-    let place = channels.iter().position(|c| !is_possible(c))?;
-    let first = channels.get(place)?;
+    let position = channels.iter().position(|c| !is_possible(c))?;
+    let first = channels.get(position)?;
     let acceleration = first.motion(frequency)[2];
     let implied = match first.unit.is_angular()
         || acceleration < USUAL_ACCELERATION
@@ -178,7 +178,7 @@ pub fn implausible(
             let time = time.map(|unit| format!("the times read as {}", unit.symbol()));
             let changes: Vec<String> = time.into_iter().chain(changed).collect();
             let amplitude = read
-                .get(place)
+                .get(position)
                 .map_or(String::new(), |c| format!(" and {}", c.in_words()));
             let gives = if changes.len() > 1 || time_alone(&changes) {
                 "give"

@@ -238,8 +238,8 @@ impl ScaledUnit {
     pub fn parse(kind: Measurand, text: &str, in_file: Option<Unit>) -> Result<Self, InputError> {
         let (scale, unit) = split_factor(text);
         if scale == 0.0 || !scale.is_finite() {
-            let place = format!("unit of the {}", kind.name());
-            return Err(InputError::argument(place, "invalid factor of a unit")
+            let location = format!("unit of the {}", kind.name());
+            return Err(InputError::argument(location, "invalid factor of a unit")
                 .found(quote(text))
                 .expected("a finite number other than 0 before the unit, as in `50 g`"));
         }

@@ -36,10 +36,10 @@ impl Failure {
     pub fn raise(self, py: Python<'_>) -> PyErr {
         let made = py.import("kmcfit._errors").and_then(|errors| match self {
             Self::Input(error) => {
-                let place = place(&error);
+                let location = location(&error);
                 let details = (
                     error.problem,
-                    place,
+                    location,
                     error.found,
                     error.expected,
                     error.hint,
@@ -55,27 +55,27 @@ impl Failure {
 }
 
 /// Place of an error, with its key; a changed value by its key alone.
-fn place(error: &InputError) -> String {
-    let place = match &error.place {
+fn location(error: &InputError) -> String {
+    let location = match &error.location {
         Location::Argument(name) if name.starts_with("--set ") && error.key.is_some() => {
             return error.key.clone().unwrap_or_default();
         }
         Location::Argument(name) => name.trim_start_matches("--").to_owned(),
-        place => place.to_string(),
+        location => location.to_string(),
     };
     match &error.key {
-        Some(key) => format!("{place}: {key}"),
-        None => place,
+        Some(key) => format!("{location}: {key}"),
+        None => location,
     }
 }
 
 /// An error in a text that was made from arguments: its place is the key, which is an argument, and no line.
 pub fn keyed(error: InputError, path: &Path) -> InputError {
     let is_of_text =
-        matches!(&error.place, Location::Line { file, .. } | Location::File(file) if file == path);
+        matches!(&error.location, Location::Line { file, .. } | Location::File(file) if file == path);
     match error.key {
         Some(key) if is_of_text => InputError {
-            place: Location::Argument(key),
+            location: Location::Argument(key),
             key: None,
             ..error
         },

@@ -1,6 +1,6 @@
 //! `kmcfit compare`: fits models, reads finished runs, and writes their comparison.
 
-use super::fit::{RunPlace, fit_into};
+use super::fit::{RunLocation, fit_into};
 use super::progress::{Activity, Progress};
 use super::{
     CommandError, NOT_CONVERGED, OK, Overrides, exit_code, inputs, interrupt, note_changes, print,
@@ -117,8 +117,9 @@ fn names(paths: &[PathBuf], out: &Path) -> Vec<String> {
         let whole = path.canonicalize().unwrap_or_else(|_| path.clone());
         let stem = stem(&whole);
         let is_free = |name: &String| {
-            let place = out.join(name).canonicalize();
-            let overwrites = !path.is_dir() && place.is_ok_and(|place| folders.contains(&place));
+            let location = out.join(name).canonicalize();
+            let overwrites =
+                !path.is_dir() && location.is_ok_and(|location| folders.contains(&location));
             // Some file systems ignore case.
             !overwrites && names.iter().all(|taken| !taken.eq_ignore_ascii_case(name))
         };
@@ -143,10 +144,10 @@ pub(super) fn compared(
         let run = match entry {
             Entry::Model(to_fit) => {
                 let shown = format!("{}/{all} {name}", i + 1);
-                let place = format!("{inside}{name}");
-                let run = RunPlace {
+                let location = format!("{inside}{name}");
+                let run = RunLocation {
                     folder,
-                    inside: Some(&place),
+                    inside: Some(&location),
                 };
                 fitted(&name, *to_fit, run, &shown, &flag)?
             }
@@ -169,7 +170,7 @@ pub(super) fn compared(
 fn fitted(
     name: &str,
     ToFit { file, mut model }: ToFit,
-    place: RunPlace,
+    location: RunLocation,
     shown: &str,
     flag: &Arc<AtomicBool>,
 ) -> Result<Result<ComparedRun, String>, CommandError> {
@@ -181,8 +182,14 @@ fn fitted(
     }
     model.settings.interrupt = Some(Arc::clone(flag));
     let progress = Progress::new(shown);
-    match fit_into(place, &file, &model, &progress, RequestedFiles::figures()) {
-        Ok(_) => Ok(ComparedRun::read(name, &place.path()).map_err(|error| error.to_string())),
+    match fit_into(
+        location,
+        &file,
+        &model,
+        &progress,
+        RequestedFiles::figures(),
+    ) {
+        Ok(_) => Ok(ComparedRun::read(name, &location.path()).map_err(|error| error.to_string())),
         Err(CommandError::Numerical(reason)) => {
             say("failed", format!("{name}: {reason}"));
             Ok(Err(reason))

@@ -108,10 +108,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     folder.commit(&comparison.document()).map_err(full)?;
     print(INTRODUCTION);
     print(&screen(&comparison));
-    let place = out.display();
+    let location = out.display();
     print(&format!(
-        "\nPage   {place}/results/compare.html\n\
-         Next   change a key: `kmcfit fit {place}/models/physical.yaml --set functions.damping.penalty.weight=0.01`\n"
+        "\nPage   {location}/results/compare.html\n\
+         Next   change a key: `kmcfit fit {location}/models/physical.yaml --set functions.damping.penalty.weight=0.01`\n"
     ));
     Ok(exit_code_of(&comparison))
 }

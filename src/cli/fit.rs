@@ -96,14 +96,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     };
     let out = arguments.out.clone().unwrap_or_else(own);
     // The model of a record stands in no file yet.
-    let of_record = |error: InputError| match &error.place {
+    let of_record = |error: InputError| match &error.location {
         Location::Line { file, .. } if is_record(&arguments.model) && !file.exists() => {
             let made = format!(
                 "`kmcfit init {}` writes the model",
                 arguments.model.display()
             );
             InputError {
-                place: Location::File(arguments.model.clone()),
+                location: Location::File(arguments.model.clone()),
                 ..error.hint(made)
             }
         }
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let folder = OutputFolder::prepare(&out, "fit", inputs(&file))?;
     announce(&model);
     let progress = Progress::new("");
-    let run = RunPlace {
+    let run = RunLocation {
         folder: &folder,
         inside: None,
     };
@@ -193,12 +193,12 @@ fn is_utf8(variable: impl Fn(&str) -> Option<String>) -> bool {
 
 /// Where the files of a run are written: into a folder of its own, or `inside` that of another command.
 #[derive(Clone, Copy)]
-pub(super) struct RunPlace<'a> {
+pub(super) struct RunLocation<'a> {
     pub folder: &'a OutputFolder,
     pub inside: Option<&'a str>,
 }
 
-impl RunPlace<'_> {
+impl RunLocation<'_> {
     fn write(&self, name: &str, contents: &[u8]) -> io::Result<()> {
         match self.inside {
             Some(inside) => self.folder.write(&format!("{inside}/{name}"), contents),
@@ -225,7 +225,7 @@ impl RunPlace<'_> {
 /// # Errors
 /// If no starting point has a response, a data file has changed since it was read, or a file cannot be written.
 pub(super) fn fit_into(
-    run: RunPlace,
+    run: RunLocation,
     file: &ModelFile,
     model: &Model,
     progress: &Progress,

@@ -91,10 +91,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     if is_new {
         text += &format!("  schema for editors: {}\n", schema.display());
     }
-    let place = out.display();
-    let argument = shell_quoted(&place.to_string());
+    let location = out.display();
+    let argument = shell_quoted(&location.to_string());
     print(&format!(
-        "{text}Model {place}; review it, then run\n  kmcfit check {argument}\n  kmcfit fit {argument}\n"
+        "{text}Model {location}; review it, then run\n  kmcfit check {argument}\n  kmcfit fit {argument}\n"
     ));
     Ok(OK)
 }

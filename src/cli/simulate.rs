@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     drop(reading);
     let noise = noise(arguments)?;
     if let Some(out) = &arguments.out {
-        check_place(out, &file)?;
+        check_location(out, &file)?;
     }
     let experiment = chosen(arguments, &problem.experiments)?;
     if !experiment.begins_known() {
@@ -129,7 +129,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
 const MADE_BY: &str = "kmcfit simulate";
 
 /// Refuses to write over an input of the model, or over a file that this command did not write.
-fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
+fn check_location(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     let target = out.canonicalize().ok();
     for input in inputs(file) {
         if target.is_some() && input.canonicalize().ok() == target {

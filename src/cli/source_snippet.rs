@@ -36,7 +36,7 @@ pub struct Excerpt {
 impl Excerpt {
     /// The line of an error, read from its file; `None` for an error without a line, or a file that is not text.
     pub fn of(error: &InputError) -> Option<Self> {
-        match &error.place {
+        match &error.location {
             Location::Line { file, line, column } => {
                 let text = line_of(file, *line)?;
                 let start = (*column - 1).min(text.len());
@@ -170,8 +170,8 @@ fn field(text: &[char], found: &str) -> [usize; 2] {
     let quoted = found
         .split_once('`')
         .and_then(|(_, rest)| rest.split_once('`'));
-    let mut places: Vec<[usize; 2]> = match quoted {
-        Some((wanted, _)) => places_of(text, wanted),
+    let mut positions: Vec<[usize; 2]> = match quoted {
+        Some((wanted, _)) => positions_of(text, wanted),
         None => {
             let number: Option<f64> = found.split(' ').next().and_then(|n| n.parse().ok());
             let is_found = |[start, end]: &[usize; 2]| {
@@ -181,7 +181,7 @@ fn field(text: &[char], found: &str) -> [usize; 2] {
             fields(text).into_iter().filter(is_found).collect()
         }
     };
-    match (places.pop(), places.is_empty()) {
+    match (positions.pop(), positions.is_empty()) {
         (Some(only), true) => only,
         _ => [0, text.len()],
     }
@@ -193,7 +193,7 @@ fn is_edge(c: Option<&char>) -> bool {
 }
 
 /// Start and end of every place in a row that has the text of one or several fields.
-fn places_of(text: &[char], wanted: &str) -> Vec<[usize; 2]> {
+fn positions_of(text: &[char], wanted: &str) -> Vec<[usize; 2]> {
     let wanted: Vec<char> = wanted.chars().collect();
     let is_here = |&i: &usize| {
         !wanted.is_empty()
@@ -217,26 +217,26 @@ mod tests {
     use super::*;
     use insta::assert_snapshot;
 
-    fn shown(text: &str, place: impl Fn(std::path::PathBuf) -> Location, found: &str) -> String {
+    fn shown(text: &str, location: impl Fn(std::path::PathBuf) -> Location, found: &str) -> String {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("file");
         std::fs::write(&path, text).expect("a file");
-        let error = InputError::new(place(path), "wrong").found(found);
+        let error = InputError::new(location(path), "wrong").found(found);
         Excerpt::of(&error).map_or("nothing".into(), |e| e.to_string())
     }
 
     fn at(text: &str, line: usize, column: usize) -> String {
-        let place = |file| Location::Line { file, line, column };
-        shown(text, place, "")
+        let location = |file| Location::Line { file, line, column };
+        shown(text, location, "")
     }
 
     fn row(text: &str, line: usize, found: &str) -> String {
-        let place = |file| Location::Row {
+        let location = |file| Location::Row {
             file,
             line,
             column: None,
         };
-        shown(text, place, found)
+        shown(text, location, found)
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `kmcfit verify`: fits the model of a run again and compares every number.
 
-use super::fit::{RunPlace, fit_into, read};
+use super::fit::{RunLocation, fit_into, read};
 use super::progress::Progress;
 use super::{CommandError, NOT_CONVERGED, OK, print, unwritable};
 use crate::error::InputError;
@@ -39,11 +39,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         figures: false,
         tables: run.document.model.steps_per_row == 1,
     };
-    let place = tempfile::tempdir().map_err(|error| unwritable(&std::env::temp_dir(), &error))?;
-    let again = place.path().join("run");
+    let location =
+        tempfile::tempdir().map_err(|error| unwritable(&std::env::temp_dir(), &error))?;
+    let again = location.path().join("run");
     let folder = OutputFolder::prepare(&again, "fit", [])?;
     let progress = Progress::new("fitting again");
-    let new_run = RunPlace {
+    let new_run = RunLocation {
         folder: &folder,
         inside: None,
     };
@@ -94,7 +95,7 @@ impl Compared {
     }
 
     /// Compares two values at a place; `floor` is a difference of numbers that is rounding.
-    fn values(&mut self, place: &str, stored: &Value, new: &Value, floor: f64) {
+    fn values(&mut self, location: &str, stored: &Value, new: &Value, floor: f64) {
         match (stored, new) {
             (Value::Object(stored), Value::Object(new)) => {
                 let names = stored
@@ -103,14 +104,14 @@ impl Compared {
                 for name in names.filter(|name| !LEFT_OUT.contains(&name.as_str())) {
                     let [stored, new] =
                         [stored, new].map(|map| map.get(name).unwrap_or(&Value::Null));
-                    self.values(&format!("{place}/{name}"), stored, new, floor);
+                    self.values(&format!("{location}/{name}"), stored, new, floor);
                 }
             }
             (Value::Array(stored), Value::Array(new)) if stored.len() == new.len() => {
                 let sizes = new.iter().filter_map(Value::as_f64).map(f64::abs);
                 let floor = OF_LARGEST * sizes.fold(0.0, f64::max);
                 for (i, (stored, new)) in stored.iter().zip(new).enumerate() {
-                    self.values(&format!("{place}/{}", i + 1), stored, new, floor);
+                    self.values(&format!("{location}/{}", i + 1), stored, new, floor);
                 }
             }
             _ => {
@@ -123,7 +124,7 @@ impl Compared {
                 };
                 if !is_near {
                     self.differences
-                        .push(format!("{place}: {stored} in the run, {new} again"));
+                        .push(format!("{location}: {stored} in the run, {new} again"));
                 }
             }
         }

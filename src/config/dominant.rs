@@ -83,8 +83,12 @@ pub(super) fn remove_outliers(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64
         far = spikes(&times, &values);
     }
     let first = values[*far.first()?];
-    let mut place = 0..;
-    pairs.retain(|_| place.next().is_some_and(|i| far.binary_search(&i).is_err()));
+    let mut position = 0..;
+    pairs.retain(|_| {
+        position
+            .next()
+            .is_some_and(|i| far.binary_search(&i).is_err())
+    });
     Some((far.len(), first))
 }
 

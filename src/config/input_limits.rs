@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::key_positions::Position;
-use super::key_positions::place;
+use super::key_positions::location;
 use crate::error::InputError;
 use crate::text_io::{binary_size, quote};
 use serde::de::DeserializeOwned;
@@ -74,7 +74,7 @@ fn check_brackets(file: &Path, text: &str) -> Result<(), InputError> {
             _ => {}
         }
         if open > MOST_OPEN_BRACKETS {
-            let at = place(file, Position::of(text, index));
+            let at = location(file, Position::of(text, index));
             return Err(InputError::new(at, "too many open brackets")
                 .found(format!(
                     "more than {MOST_OPEN_BRACKETS} brackets not closed"
@@ -106,7 +106,7 @@ fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
     }
     for mark in ['*', '&'] {
         if let Some((index, _)) = names(text, mark).nth(MOST_ALIASES) {
-            let at = place(file, Position::of(text, index));
+            let at = location(file, Position::of(text, index));
             return Err(InputError::new(at, "too many aliases or anchors")
                 .found(format!("more than {MOST_ALIASES} times `{mark}name`"))
                 .expected(format!("at most {MOST_ALIASES}")));
@@ -116,7 +116,7 @@ fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
     for (index, name) in names(text, '&') {
         let here = Position::of(text, index);
         if let Some(first) = seen.insert(name, here) {
-            return Err(InputError::new(place(file, here), "duplicate anchor")
+            return Err(InputError::new(location(file, here), "duplicate anchor")
                 .found(format!(
                     "{} again; it is first given in line {}",
                     quote(&format!("&{name}")),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::input_limits::{Checked, LONGEST_MODEL};
-use super::key_positions::{key_path, locate, place};
+use super::key_positions::{key_path, locate, location};
 use super::overrides::Override;
 use super::yaml_errors;
 use crate::digest::ReadFiles;
@@ -94,7 +94,7 @@ impl ModelFile {
         for change in overrides {
             let unreadable = |error: serde_yaml::Error| {
                 InputError::new(
-                    change.place(),
+                    change.location(),
                     "the model cannot be written with this value",
                 )
                 .found(error)
@@ -104,7 +104,7 @@ impl ModelFile {
             change.apply(&mut model)?;
             let text = serde_yaml::to_string(&model).map_err(unreadable)?;
             let moved = |error: InputError| InputError {
-                place: change.place(),
+                location: change.location(),
                 ..error
             };
             let edited = Self::parse(&self.path, &text).map_err(moved)?;
@@ -255,7 +255,7 @@ impl ModelFile {
     pub(super) fn error_about(&self, key: &str, error: InputError) -> InputError {
         let here = self.error_at(key, &error.problem);
         InputError {
-            place: here.place,
+            location: here.location,
             key: here.key,
             ..error
         }
@@ -268,14 +268,14 @@ impl ModelFile {
     pub fn error_at(&self, key: &str, problem: impl Into<String>) -> InputError {
         let path = key_path(key);
         if let Some(change) = self.overrides.iter().rev().find(|o| o.covers(&path)) {
-            return InputError::new(change.place(), problem).key(key);
+            return InputError::new(change.location(), problem).key(key);
         }
         let found = locate(&self.text, &path);
         let position = match found.key {
             Some(key) if found.depth < path.len() => key,
             _ => found.value,
         };
-        InputError::new(place(&self.path, position), problem).key(key)
+        InputError::new(location(&self.path, position), problem).key(key)
     }
 
     /// The files that the model reads, each once, in the order of the text.

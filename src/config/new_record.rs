@@ -184,7 +184,7 @@ impl InputFile {
         let missing = samples.iter().filter(|x| x.is_nan()).count();
         if let Some(first) = samples.iter().position(|x| x.is_nan()) {
             return Err(InputError::new(
-                self.table.place(first, Some(&label)),
+                self.table.location(first, Some(&label)),
                 "the input has gaps",
             )
             .found(format!("{missing} of {} values missing", samples.len()))

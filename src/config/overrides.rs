@@ -72,7 +72,7 @@ impl Override {
     }
 
     /// The override as the location of an error.
-    pub(super) fn place(&self) -> Location {
+    pub(super) fn location(&self) -> Location {
         Location::Argument(format!("--set {self}"))
     }
 
@@ -133,7 +133,7 @@ impl Override {
     }
 
     fn error(&self, problem: String) -> InputError {
-        InputError::new(self.place(), problem)
+        InputError::new(self.location(), problem)
     }
 }
 

@@ -296,8 +296,8 @@ impl Visitor<'_> for NextKey<'_> {
     // An error raised in this visit has the position of the key.
     fn visit_str<E: Error>(self, written: &str) -> Result<usize, E> {
         let mut names = self.keys.iter().map(|key| key.name);
-        let place = names.clone().position(|name| name == written);
-        place.ok_or_else(|| {
+        let position = names.clone().position(|name| name == written);
+        position.ok_or_else(|| {
             self.report.raise(Mistake::UnknownKey {
                 key: written.to_owned(),
                 known: names.by_ref().collect(),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::key_positions::place;
+use super::key_positions::location;
 use super::key_positions::{self, Position};
 use super::reader::Scalar;
 use crate::error::InputError;
@@ -97,7 +97,7 @@ pub(super) fn input_error(file: &Path, text: &str, error: &serde_yaml::Error) ->
     let message = error.to_string();
     let at = key_positions::position(error).unwrap_or(Position::START);
     if let Some(tab) = tab_before(text, at) {
-        return InputError::new(place(file, tab), "a tab is used as indentation")
+        return InputError::new(location(file, tab), "a tab is used as indentation")
             .found("a tab")
             .expected("spaces: YAML allows no tabs there")
             .hint("replace every tab at the beginning of a line by spaces");
@@ -105,7 +105,7 @@ pub(super) fn input_error(file: &Path, text: &str, error: &serde_yaml::Error) ->
     if message.contains("control characters are not allowed") {
         return control_character(file, text);
     }
-    let mut problem = InputError::new(place(file, at), "the file is not valid YAML").found(
+    let mut problem = InputError::new(location(file, at), "the file is not valid YAML").found(
         match line_at(text, at) {
             "" => "the end of the file or an empty line".to_owned(),
             line => quote(line),
@@ -143,7 +143,7 @@ fn control_character(file: &Path, text: &str) -> InputError {
     };
     let at = Position::of(text, index);
     InputError::new(
-        place(file, at),
+        location(file, at),
         "a control character is not allowed in YAML",
     )
     .found(found)

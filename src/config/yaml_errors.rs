@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::input_limits::Checked;
 use super::key::{ValueType, model};
-use super::key_positions::place;
+use super::key_positions::location;
 use super::key_positions::{self, Position, key_path, locate};
 use super::reader::{Mistake, Report, Typed};
 use super::retired::successor;
@@ -76,7 +76,7 @@ impl YamlError<'_> {
 
     /// An error at another position; the key may be empty.
     fn at_position(&self, at: Position, problem: impl Into<String>) -> InputError {
-        let error = InputError::new(place(self.file, at), problem);
+        let error = InputError::new(location(self.file, at), problem);
         match self.key {
             "" => error,
             key => error.key(key),
@@ -111,7 +111,7 @@ impl YamlError<'_> {
 
     /// The error for a file with more than one document.
     fn several_documents(&self, at: Position) -> InputError {
-        InputError::new(place(self.file, at), "second YAML document")
+        InputError::new(location(self.file, at), "second YAML document")
             .found("two documents in one file")
             .expected("one model per file")
             .hint("remove the line `---` and what follows, or put it into a file of its own")

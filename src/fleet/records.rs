@@ -127,7 +127,7 @@ impl RecordList {
                     .expected(format!("{}, one for each column", headings.len())));
             }
             let record = record(path, &headings, &row).map_err(|error| InputError {
-                place: at(line, "").place,
+                location: at(line, "").location,
                 ..error
             });
             list.records.push(record?);

@@ -217,11 +217,11 @@ fn trend_figure(distribution: &Distribution, trend: &Trend) -> Figure {
     let Distribution {
         name, values, line, ..
     } = distribution;
-    let mut places: Vec<usize> = (0..values.len())
+    let mut positions: Vec<usize> = (0..values.len())
         .filter(|i| trend.values[*i].is_finite() && values[*i].is_finite())
         .collect();
-    places.sort_by(|i, j| trend.values[*i].total_cmp(&trend.values[*j]));
-    let of = |list: &[f64]| places.iter().map(|i| list[*i]).collect::<Vec<f64>>();
+    positions.sort_by(|i, j| trend.values[*i].total_cmp(&trend.values[*j]));
+    let of = |list: &[f64]| positions.iter().map(|i| list[*i]).collect::<Vec<f64>>();
     let (x, name) = (of(&trend.values), quantity(name));
     let dots = Style::new(Colour::nth(0)).width(4.0);
     let text = "Each record, and the line with the median slope of all pairs of records.";

@@ -106,11 +106,11 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// Quantile of sorted values, interpolated linearly between them; `None` without any.
 fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let place = share * (sorted.len().max(1) - 1) as f64;
-    let below = place.floor() as usize;
+    let position = share * (sorted.len().max(1) - 1) as f64;
+    let below = position.floor() as usize;
     let low = *sorted.get(below)?;
     let above = sorted.get(below + 1).unwrap_or(&low);
-    Some(low + (place - below as f64) * (above - low))
+    Some(low + (position - below as f64) * (above - low))
 }
 
 #[cfg(test)]

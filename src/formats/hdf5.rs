@@ -307,19 +307,21 @@ impl Reader<'_, '_> {
             .zip(&chunk)
             .map(|(n, chunk)| n.div_ceil(*chunk));
         let all = product(&mut counts.clone());
-        let place = |offset: &[u64]| {
+        let location = |offset: &[u64]| {
             let mut numbers = offset.iter().zip(&chunk).map(|(from, chunk)| from / chunk);
             let last = |numbers: &mut dyn DoubleEndedIterator<Item = u64>| numbers.next_back();
             let column = last(&mut numbers).unwrap_or(0);
             [last(&mut numbers).unwrap_or(0) as usize, column as usize]
         };
-        let written: BTreeSet<[usize; 2]> = written.iter().map(|c| place(&c.offset)).collect();
+        let written: BTreeSet<[usize; 2]> = written.iter().map(|c| location(&c.offset)).collect();
         if written.len() as u64 == all {
             return Ok(Missing::default());
         }
         let width = |from_end: usize| {
-            let place = chunk.len().checked_sub(from_end);
-            place.and_then(|i| chunk.get(i)).map_or(1, |n| *n as usize)
+            let location = chunk.len().checked_sub(from_end);
+            location
+                .and_then(|i| chunk.get(i))
+                .map_or(1, |n| *n as usize)
         };
         Ok(Missing {
             written: Some(written),

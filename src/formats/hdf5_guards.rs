@@ -41,7 +41,7 @@ impl Missing {
     /// True for an element of such a chunk, by its row and column.
     pub fn contains(&self, [row, column]: [usize; 2]) -> bool {
         let [rows, columns] = self.chunk;
-        let place = || [row / rows.max(1), column / columns.max(1)];
-        (self.written.as_ref()).is_some_and(|written| !written.contains(&place()))
+        let location = || [row / rows.max(1), column / columns.max(1)];
+        (self.written.as_ref()).is_some_and(|written| !written.contains(&location()))
     }
 }

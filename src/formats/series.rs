@@ -38,9 +38,9 @@ fn head(line: &str) -> Option<Head> {
             .ok()
             .filter(|x| x.is_finite() && *x > 0.0)
     };
-    let place = |names: &[&str]| words.iter().position(|word| names.contains(word));
-    let before = |names: &[&str]| number(place(names)?.checked_sub(1)?);
-    let after = |names: &[&str]| number(place(names)? + 1);
+    let location = |names: &[&str]| words.iter().position(|word| names.contains(word));
+    let before = |names: &[&str]| number(location(names)?.checked_sub(1)?);
+    let after = |names: &[&str]| number(location(names)? + 1);
     if let (Some(count), Some(step), Some("npts"), Some("dt")) = (
         number(0),
         number(1),

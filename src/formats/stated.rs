@@ -196,11 +196,11 @@ impl Subject<'_> {
                     described = described.or(unit.map(str::to_owned));
                 }
                 Meaning::Factor | Meaning::Offset if self.has_scales && fact.values.len() == 1 => {
-                    let place = match fact.name.meaning {
+                    let position = match fact.name.meaning {
                         Meaning::Factor => &mut found.factor,
                         _ => &mut found.offset,
                     };
-                    *place = fact.number().map(|(number, _)| number);
+                    *position = fact.number().map(|(number, _)| number);
                 }
                 Meaning::Factor | Meaning::Offset | Meaning::Unapplied if is_near || !is_time => {
                     let is_scale = fact.number().is_some() && !fact.is_neutral();

@@ -152,8 +152,8 @@ impl Tracks {
         budget: &mut Budget,
     ) -> Result<(), InputError> {
         if is_new {
-            for place in self.active.drain(..) {
-                if let Some(track) = self.all.get_mut(place) {
+            for location in self.active.drain(..) {
+                if let Some(track) = self.all.get_mut(location) {
                     track.is_active = false;
                 }
             }
@@ -168,8 +168,8 @@ impl Tracks {
                 outer.extend(object.properties);
                 continue;
             };
-            let place = match self.by_path.get(&object.path) {
-                Some(place) => *place,
+            let location = match self.by_path.get(&object.path) {
+                Some(location) => *location,
                 None => {
                     budget.name(&name)?;
                     let group = object.path.rsplit_once("'/'").unwrap_or_default().0;
@@ -178,7 +178,7 @@ impl Tracks {
                     self.all.len() - 1
                 }
             };
-            let Some(track) = self.all.get_mut(place) else {
+            let Some(track) = self.all.get_mut(location) else {
                 continue;
             };
             track.properties.extend(object.properties);
@@ -188,9 +188,9 @@ impl Tracks {
             }
             let has_raw = !matches!(object.raw, RawData::None);
             if has_raw && !track.is_active {
-                self.active.push(place);
+                self.active.push(location);
             } else if !has_raw && track.is_active {
-                self.active.retain(|active| *active != place);
+                self.active.retain(|active| *active != location);
             }
             track.is_active = has_raw;
         }
@@ -205,7 +205,7 @@ impl Tracks {
         budget: &mut Budget,
     ) -> Result<usize, InputError> {
         let indices: Vec<(usize, RawIndex)> = (self.active.iter())
-            .filter_map(|place| Some((*place, self.all.get(*place)?.index?)))
+            .filter_map(|location| Some((*location, self.all.get(*location)?.index?)))
             .filter(|(_, index)| index.size > 0)
             .collect();
         let sizes = indices.iter().map(|(_, index)| index.size);
@@ -224,8 +224,8 @@ impl Tracks {
             let data = raw.take(chunks * chunk, "the samples of a segment")?;
             let stride = chunk / count.max(1);
             let mut offset = 0;
-            for (place, index) in indices {
-                if let Some(track) = self.all.get_mut(place) {
+            for (location, index) in indices {
+                if let Some(track) = self.all.get_mut(location) {
                     track.add(
                         data,
                         raw.order,
@@ -240,9 +240,9 @@ impl Tracks {
             return Ok(raw.left());
         }
         for _ in 0..chunks {
-            for (place, index) in &indices {
+            for (location, index) in &indices {
                 let data = raw.take(index.size, "the samples of a segment")?;
-                if let Some(track) = self.all.get_mut(*place) {
+                if let Some(track) = self.all.get_mut(*location) {
                     let stride = index.kind.size() as usize;
                     track.add(data, raw.order, 0, stride, index.kind, budget)?;
                 }

@@ -110,7 +110,7 @@ impl FunctionHeader {
             (true, ..) => (1.0, None),
         };
         Ok(Self {
-            name: format!("{name}{}", place(ends)),
+            name: format!("{name}{}", position(ends)),
             other,
             is_double: matches!(data_type, 4 | 6),
             count: count as usize,
@@ -126,7 +126,7 @@ impl FunctionHeader {
 }
 
 /// Node and direction of the response, as in `_12+Z`.
-fn place(line: &str) -> String {
+fn position(line: &str) -> String {
     let direction = match field(line, 51, 55).parse::<i32>().unwrap_or(0) {
         1 => "+X",
         2 => "+Y",

@@ -70,9 +70,9 @@ impl CompletedFit {
         let last = times.len().saturating_sub(1);
         let steps = points.saturating_sub(1).clamp(1, last.max(1));
         let rows = |values: &[f64]| -> Vec<f64> {
-            let places = (0..=steps).map(|i| i * last / steps);
-            places
-                .filter_map(|place| values.get(place).copied())
+            let positions = (0..=steps).map(|i| i * last / steps);
+            positions
+                .filter_map(|position| values.get(position).copied())
                 .collect()
         };
         let t = rows(&times);

@@ -34,7 +34,8 @@ impl CsvTable {
         // Bits and place of the number before in each column: constant functions repeat theirs.
         let mut before = vec![(f64::NAN.to_bits(), 0..0); self.columns.len()];
         for row in 0..rows {
-            for (j, (column, (bits, place))) in self.columns.iter().zip(&mut before).enumerate() {
+            for (j, (column, (bits, position))) in self.columns.iter().zip(&mut before).enumerate()
+            {
                 if j > 0 {
                     text.push(',');
                 }
@@ -42,12 +43,12 @@ impl CsvTable {
                     continue;
                 };
                 if value.to_bits() == *bits {
-                    text.extend_from_within(place.clone());
+                    text.extend_from_within(position.clone());
                     continue;
                 }
                 let start = text.len();
                 push_number(&mut text, value);
-                (*bits, *place) = (value.to_bits(), start..text.len());
+                (*bits, *position) = (value.to_bits(), start..text.len());
             }
             text.push('\n');
         }

@@ -108,12 +108,12 @@ impl ResultTable {
         match values.iter().position(|v| !v.is_finite()) {
             None => Ok(values),
             Some(i) => {
-                let place = Location::Row {
+                let location = Location::Row {
                     file: self.path.clone(),
                     line: i + 2,
                     column: Some(name.into()),
                 };
-                Err(InputError::new(place, "not a finite number").expected("one"))
+                Err(InputError::new(location, "not a finite number").expected("one"))
             }
         }
     }
@@ -151,12 +151,12 @@ fn take(
     columns: &mut [Vec<f64>],
 ) -> Result<(), InputError> {
     let damaged = |problem: &str, column: Option<&String>| {
-        let place = Location::Row {
+        let location = Location::Row {
             file: path.to_path_buf(),
             line: row + 2,
             column: column.cloned(),
         };
-        InputError::new(place, problem)
+        InputError::new(location, problem)
     };
     let fields = line.split(',').count();
     if fields != headers.len() {

@@ -193,8 +193,8 @@ fn every(values: &[f64], steps: usize) -> Vec<f64> {
     let Some(last) = values.len().checked_sub(1) else {
         return Vec::new();
     };
-    let places = (0..last).step_by(steps).chain([last]);
-    places.map(|place| values[place]).collect()
+    let positions = (0..last).step_by(steps).chain([last]);
+    positions.map(|position| values[position]).collect()
 }
 
 #[cfg(test)]

@@ -129,7 +129,7 @@ impl Chart {
 
     /// The dot of a point, from the upper left.
     fn dot(&self, t: f64, y: f64) -> Option<[usize; 2]> {
-        let place = |x: f64, [low, high]: [f64; 2], dots: usize| {
+        let location = |x: f64, [low, high]: [f64; 2], dots: usize| {
             let share = match high > low {
                 true => (x - low) / (high - low),
                 false => 0.5,
@@ -137,8 +137,8 @@ impl Chart {
             let last = (dots - 1) as f64;
             (share.is_finite()).then(|| (share * last).round().clamp(0.0, last) as usize)
         };
-        let across = place(t, self.times, 2 * self.width)?;
-        let up = place(y, self.values, 4 * ROWS)?;
+        let across = location(t, self.times, 2 * self.width)?;
+        let up = location(y, self.values, 4 * ROWS)?;
         Some([across, 4 * ROWS - 1 - up])
     }
 

@@ -40,17 +40,17 @@ pub(super) fn decade(exponent: i64) -> String {
 /// determines the notation of all labels: with or without a power of ten.
 pub(super) fn tick(value: f64, step: f64, largest: f64) -> String {
     let order = magnitude(largest);
-    let places = magnitude(step);
+    let positions = magnitude(step);
     // Removes the sign of zero.
     let value = value + 0.0;
     if (-3..5).contains(&order) {
-        return minus(&format!("{value:.*}", digits(-places)));
+        return minus(&format!("{value:.*}", digits(-positions)));
     }
     if value == 0.0 {
         return "0".to_string();
     }
     let mantissa = value / 10f64.powi(order as i32);
-    let mantissa = minus(&format!("{mantissa:.*}", digits(order - places)));
+    let mantissa = minus(&format!("{mantissa:.*}", digits(order - positions)));
     format!("{mantissa}×{}", decade(order))
 }
 
@@ -59,8 +59,8 @@ fn magnitude(value: f64) -> i64 {
     (value.abs().log10() + 1e-9).floor() as i64
 }
 
-fn digits(places: i64) -> usize {
-    places.clamp(0, 15) as usize
+fn digits(positions: i64) -> usize {
+    positions.clamp(0, 15) as usize
 }
 
 /// Writes a true minus sign.

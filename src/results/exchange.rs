@@ -31,7 +31,7 @@ fn no_folder(path: &Path) -> String {
 }
 
 /// The absolute path of a folder for results, whose parent exists then.
-pub(super) fn place(path: &Path) -> Result<PathBuf, InputError> {
+pub(super) fn location(path: &Path) -> Result<PathBuf, InputError> {
     let refused = |problem: &str| InputError::argument("--out", problem).found(path.display());
     if path.exists() {
         let found = path
@@ -81,7 +81,7 @@ fn is_mount_point(_: &Path) -> bool {
     false
 }
 
-/// Puts the folder `new` into the place of `path`, if possible in one step; where the system has none, the run before is moved aside first.
+/// Puts the folder `new` into the location of `path`, if possible in one step; where the system has none, the run before is moved aside first.
 pub(super) fn exchange(new: &Path, path: &Path) -> io::Result<()> {
     if !path.exists() {
         return fs::rename(new, path);

@@ -4,7 +4,7 @@
 //! The document of a run, such as `result.json`, lists its files with their digests. A folder that holds other or edited files is refused
 //! before the work begins, so nothing of the user's is replaced.
 
-use super::exchange::{PREFIX, complete, exchange, locked, place, remove_leftovers, unwritable};
+use super::exchange::{PREFIX, complete, exchange, location, locked, remove_leftovers, unwritable};
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
 use serde::{Deserialize, Serialize};
@@ -70,8 +70,8 @@ impl OutputFolder {
         inputs: impl IntoIterator<Item = PathBuf>,
     ) -> Result<Self, InputError> {
         let shown = path.to_path_buf();
-        let path = place(path)?;
-        // `place` accepts paths with a parent.
+        let path = location(path)?;
+        // `location` accepts paths with a parent.
         let parent = path.parent().unwrap_or(&path);
         remove_leftovers(parent);
         complete(&path);
@@ -326,14 +326,14 @@ mod tests {
 
     #[test]
     fn a_run_replaces_the_one_before_and_leaves_nothing_beside() {
-        let place = tempfile::tempdir().expect("a folder");
-        let path = place.path().join("runs/a");
+        let location = tempfile::tempdir().expect("a folder");
+        let path = location.path().join("runs/a");
         run(&path, "fit", &[("a.csv", "1"), ("figures/b.svg", "2")]).expect("new");
         run(&path, "fit", &[("a.csv", "3")]).expect("again");
         assert_eq!(files_in(&path).expect("files"), ["a.csv", RESULT]);
         assert_eq!(fs::read_to_string(path.join("a.csv")).expect("text"), "3");
         assert_eq!(
-            fs::read_dir(place.path().join("runs"))
+            fs::read_dir(location.path().join("runs"))
                 .expect("a folder")
                 .count(),
             1
@@ -342,8 +342,8 @@ mod tests {
 
     #[test]
     fn files_of_others_and_changed_ones_are_kept() {
-        let place = tempfile::tempdir().expect("a folder");
-        let path = place.path().join("a");
+        let location = tempfile::tempdir().expect("a folder");
+        let path = location.path().join("a");
         run(&path, "fit", &[("a.csv", "1")]).expect("new");
         assert!(
             run(&path, "study", &[])
@@ -375,13 +375,14 @@ mod tests {
 
     #[test]
     fn the_folder_of_a_killed_run_is_removed_and_that_of_a_living_one_stays() {
-        let place = tempfile::tempdir().expect("a folder");
-        let living = OutputFolder::prepare(&place.path().join("a"), "fit", []).expect("a folder");
-        fs::create_dir(place.path().join(".kmcfit-dead")).expect("a folder");
-        fs::create_dir(place.path().join("kmcfit-notes")).expect("a folder");
-        run(&place.path().join("b"), "fit", &[]).expect("a run");
-        assert!(living.staging.path().exists() && place.path().join("kmcfit-notes").exists());
-        assert!(!place.path().join(".kmcfit-dead").exists());
+        let location = tempfile::tempdir().expect("a folder");
+        let living =
+            OutputFolder::prepare(&location.path().join("a"), "fit", []).expect("a folder");
+        fs::create_dir(location.path().join(".kmcfit-dead")).expect("a folder");
+        fs::create_dir(location.path().join("kmcfit-notes")).expect("a folder");
+        run(&location.path().join("b"), "fit", &[]).expect("a run");
+        assert!(living.staging.path().exists() && location.path().join("kmcfit-notes").exists());
+        assert!(!location.path().join(".kmcfit-dead").exists());
     }
 
     #[test]

@@ -111,7 +111,7 @@ impl Table {
     }
 
     fn push_channel(&mut self, channel: FileChannel) {
-        let place = |row: usize| Location::Sample {
+        let location = |row: usize| Location::Sample {
             file: self.path.clone(),
             sample: row + 1,
             channel: Some(channel.name.clone()),
@@ -126,9 +126,9 @@ impl Table {
                 .unwrap_or_default()
         };
         self.columns.push(ColumnValues {
-            unnumbered: unnumbered.map(|row| field::not_a_number(place(row), &text(row), '.')),
+            unnumbered: unnumbered.map(|row| field::not_a_number(location(row), &text(row), '.')),
             unreadable: unreadable.map(|row| {
-                InputError::new(place(row), "not a finite number")
+                InputError::new(location(row), "not a finite number")
                     .found(quote(&text(row)))
                     .expected("a finite number, or NaN for a missing sample")
             }),

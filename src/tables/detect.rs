@@ -52,7 +52,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
         };
         let guessed_comma =
             decimal == ',' && format.decimal.is_none() && format.delimiter.is_none();
-        let place = match candidate.width {
+        let position = match candidate.width {
             // Numbers with one comma are read as two columns rather than as decimal commas in one.
             1 if guessed_comma => continue,
             1 => &mut single,
@@ -60,8 +60,8 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
         };
         // Blanks part the words of a preamble.
         let margin = if delimiter == ' ' { 1.1 } else { 1.0 };
-        if (place.as_ref()).is_none_or(|p| candidate.score > margin * p.score) {
-            *place = Some(candidate);
+        if (position.as_ref()).is_none_or(|p| candidate.score > margin * p.score) {
+            *position = Some(candidate);
         }
     }
     // A single column is the last choice, unless all other candidates give hardly any numbers.

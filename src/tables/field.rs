@@ -91,28 +91,28 @@ fn is_missing(field: &str) -> bool {
 }
 
 /// The error for a field that is not a finite number, where one must be.
-pub fn not_a_number(place: Location, field: &str, decimal: char) -> InputError {
+pub fn not_a_number(location: Location, field: &str, decimal: char) -> InputError {
     let problem = match parse(field, decimal) {
         Some(_) => "not a finite number",
         None if field.is_empty() => "a number is missing",
         None => "not a number",
     };
-    wrong(place, problem, field, decimal).expected("a finite number")
+    wrong(location, problem, field, decimal).expected("a finite number")
 }
 
 /// The error for a field that is neither a finite number nor missing.
-pub fn not_a_sample(place: Location, field: &str, decimal: char) -> InputError {
+pub fn not_a_sample(location: Location, field: &str, decimal: char) -> InputError {
     let expected = "a finite number, or an empty field for a missing sample";
     match parse(field, decimal) {
-        Some(_) => wrong(place, "not a finite number", field, decimal)
+        Some(_) => wrong(location, "not a finite number", field, decimal)
             .expected(expected)
             .hint("leave the field empty for a missing sample or an overload"),
-        None => wrong(place, "not a number", field, decimal).expected(expected),
+        None => wrong(location, "not a number", field, decimal).expected(expected),
     }
 }
 
-fn wrong(place: Location, problem: &str, field: &str, decimal: char) -> InputError {
-    let error = InputError::new(place, problem).found(match field {
+fn wrong(location: Location, problem: &str, field: &str, decimal: char) -> InputError {
+    let error = InputError::new(location, problem).found(match field {
         "" => "nothing".to_owned(),
         field => quote(field),
     });

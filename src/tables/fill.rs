@@ -174,8 +174,8 @@ impl Table {
         let width = self.columns.len();
         let ended = layout.width == Some(width + 1) && fields.get(width) == Some("");
         if fields.len() != width + usize::from(ended) {
-            let place = self.place(row, None);
-            return Err(ragged(place, fields, width, &self.headers));
+            let location = self.location(row, None);
+            return Err(ragged(location, fields, width, &self.headers));
         }
         for (index, text) in fields.iter().take(width).enumerate() {
             let column = &self.columns[index];
@@ -196,13 +196,13 @@ impl Table {
                 column.samples.push(clock.since(first));
                 continue;
             }
-            let place = || self.place(row, Some(&self.label(index)));
+            let location = || self.location(row, Some(&self.label(index)));
             let unnumbered = column
                 .unnumbered
                 .is_none()
-                .then(|| field::not_a_number(place(), text, layout.decimal));
+                .then(|| field::not_a_number(location(), text, layout.decimal));
             let unreadable = (read != Field::Missing)
-                .then(|| field::not_a_sample(place(), text, layout.decimal));
+                .then(|| field::not_a_sample(location(), text, layout.decimal));
             let has_other_dates = clock_in(!layout.day_first).is_some();
             let column = &mut self.columns[index];
             column.has_other_dates |= has_other_dates;
@@ -283,7 +283,7 @@ fn check_headers(
 
 /// The error for a row with more or fewer fields than there are columns.
 fn ragged(
-    place: Location,
+    location: Location,
     fields: &StringRecord,
     expected: usize,
     headers: &[String],
@@ -292,7 +292,7 @@ fn ragged(
         [] => "the row does not fit the other rows",
         _ => "the row does not fit the column names",
     };
-    let error = InputError::new(place, problem)
+    let error = InputError::new(location, problem)
         .found(count(fields.len(), "field"))
         .expected(format!("{}, one per column", count(expected, "field")));
     if fields.iter().any(|field| field.contains('\n')) {

@@ -241,7 +241,7 @@ impl Table {
     }
 
     /// Location of a data row, counted from 0, for errors.
-    pub fn place(&self, row: usize, column: Option<&str>) -> Location {
+    pub fn location(&self, row: usize, column: Option<&str>) -> Location {
         let (file, column) = (self.path.clone(), column.map(str::to_owned));
         let line = self.lines.get(row).copied().unwrap_or_default();
         match self.origin {

@@ -117,7 +117,7 @@ pub(super) fn not_increasing(table: &Table, column: &str, times: &[f64], row: us
         false => "the times do not increase",
     };
     let row_before = table.row_in_words(row - 1);
-    InputError::new(table.place(row, Some(column)), problem)
+    InputError::new(table.location(row, Some(column)), problem)
         .found(format!("{here} after {before} in {row_before}"))
         .expected(format!("a time greater than {before}"))
 }

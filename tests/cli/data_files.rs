@@ -127,9 +127,9 @@ fn a_path_that_is_not_utf_8_is_refused() {
     use std::os::unix::ffi::OsStrExt;
     let bench = Workbench::with_shipped_models();
     let odd = OsStr::from_bytes(b"models/p\xffper.yaml");
-    let place = bench.path("models");
-    let copy = place.join(OsStr::from_bytes(b"p\xffper.yaml"));
-    std::fs::copy(place.join("paper.yaml"), copy).expect("room");
+    let position = bench.path("models");
+    let copy = position.join(OsStr::from_bytes(b"p\xffper.yaml"));
+    std::fs::copy(position.join("paper.yaml"), copy).expect("room");
     for command in ["fit", "check", "simulate", "study", "compare"] {
         let output = bench
             .command(&[command])

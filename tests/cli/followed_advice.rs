@@ -50,8 +50,8 @@ fn level(document: &Value) -> usize {
 
 /// Follows each piece of advice on a fit; returns how many were tried before.
 fn follow(file: &Path) -> usize {
-    let place = tempfile::tempdir().expect("a folder");
-    let before = match fit(file, &[], &place.path().join("run")) {
+    let position = tempfile::tempdir().expect("a folder");
+    let before = match fit(file, &[], &position.path().join("run")) {
         Ok(document) => document,
         Err(message) => panic!("{}: {message}", file.display()),
     };
@@ -62,7 +62,7 @@ fn follow(file: &Path) -> usize {
             continue;
         };
         let set: Vec<&str> = set.iter().filter_map(Value::as_str).collect();
-        let after = match fit(file, &set, &place.path().join("followed")) {
+        let after = match fit(file, &set, &position.path().join("followed")) {
             Ok(document) => document,
             Err(message) => panic!("{}: {text}: {message}", file.display()),
         };

@@ -54,18 +54,18 @@ fn lines(model: &str, folder: &Path) -> String {
 fn fitted(models: &[(String, std::path::PathBuf)], data: &Path) -> String {
     let mut out = String::new();
     for (name, file) in models {
-        let place = tempfile::tempdir().expect("a folder");
+        let position = tempfile::tempdir().expect("a folder");
         let text = fs::read_to_string(file).expect("a model");
         // The data of rigs and of measured records lie elsewhere.
         let at = format!("data: {}/", data.display());
-        let model = place.path().join(file.file_name().expect("a name"));
+        let model = position.path().join(file.file_name().expect("a name"));
         fs::write(
             &model,
             text.replace("data: ../data/", &at)
                 .replace("data: $DATA/", &at),
         )
         .expect("a model");
-        let run = place.path().join("run");
+        let run = position.path().join("run");
         let mut command = Command::new(program());
         command
             .current_dir(repository("models"))

@@ -88,8 +88,8 @@ fn damaged_runs() {
                 state = state
                     .wrapping_mul(6_364_136_223_846_793_005)
                     .wrapping_add(1);
-                let place = (state >> 33) as usize % spoiled.len();
-                spoiled[place] = (state >> 20) as u8;
+                let position = (state >> 33) as usize % spoiled.len();
+                spoiled[position] = (state >> 20) as u8;
             }
             std::fs::write(&path, &spoiled).expect("room");
             // A changed digit may remain undetected: only a panic is a failure.

@@ -119,11 +119,11 @@ fn inputs_that_are_not_regular_files_are_refused() {
     use std::os::unix::fs::symlink;
     use std::os::unix::net::UnixListener;
     let folder = bench("data");
-    let place = folder.path();
-    let data = place.join("data");
+    let position = folder.path();
+    let data = position.join("data");
     let refuse = |what: &str| {
         for command in ["fit", "check", "study"] {
-            let said = refused(place, &[command, "m.yaml"]);
+            let said = refused(position, &[command, "m.yaml"]);
             assert!(said.contains(what), "{said}");
         }
         fs::remove_file(&data).expect("it was there");
@@ -143,12 +143,12 @@ fn inputs_that_are_not_regular_files_are_refused() {
     refuse("this is a folder, not a file");
     // The model itself, and samples that a simulation does not need.
     pipe();
-    let said = refused(place, &["fit", "data"]);
+    let said = refused(position, &["fit", "data"]);
     assert!(said.contains("this is a pipe"), "{said}");
     let text = MODEL.replace("DATA", "data") + "grid: {nodes: 9, duration: 1}\n";
-    fs::write(place.join("m.yaml"), text).expect("room");
+    fs::write(position.join("m.yaml"), text).expect("room");
     let simulated = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
-        .current_dir(place)
+        .current_dir(position)
         .args(["simulate", "m.yaml", "--out", "s.csv"])
         .timeout(Duration::from_secs(60))
         .output()
@@ -183,34 +183,34 @@ fn the_program_s_own_pipe() {
 #[test]
 fn names_are_only_names() {
     let folder = bench("d.csv");
-    let place = folder.path();
+    let position = folder.path();
     let rows: String = (0..21)
         .map(|i| 0.1 * f64::from(i))
         .map(|t| format!("{t},{}\n", t.cos()))
         .collect();
-    fs::write(place.join("d.csv"), format!("t_s,../../y\n{rows}")).expect("room");
+    fs::write(position.join("d.csv"), format!("t_s,../../y\n{rows}")).expect("room");
     let hostile = "\\e]0;owned\\a../../../<script>alert(1)</script>/dev/x";
     let text = MODEL.replace(
         "DATA",
         &format!("d.csv, name: \"{hostile}\", columns: {{displacement: ../../y}}"),
     ) + &format!("title: \"{hostile}\"\npredict: [{{displacement: 1, velocity: 0}}]\n");
-    fs::create_dir_all(place.join("in/side")).expect("room");
+    fs::create_dir_all(position.join("in/side")).expect("room");
     fs::write(
-        place.join("in/side/m.yaml"),
+        position.join("in/side/m.yaml"),
         text.replace("d.csv", "../../d.csv"),
     )
     .expect("room");
     let output = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
-        .current_dir(place.join("in/side"))
+        .current_dir(position.join("in/side"))
         .args(["fit", "m.yaml", "--out", "run"])
         .output()
         .expect("the program runs");
     for said in [&output.stdout, &output.stderr] {
         assert!(!said.contains(&0x1b), "{}", String::from_utf8_lossy(said));
     }
-    assert!(place.join("in/side/run/result.json").exists());
+    assert!(position.join("in/side/run/result.json").exists());
     let names = |folder: &str| {
-        let entries = fs::read_dir(place.join(folder)).expect("a folder");
+        let entries = fs::read_dir(position.join(folder)).expect("a folder");
         let mut names: Vec<_> = entries.map(|e| e.expect("an entry").file_name()).collect();
         names.sort();
         names
@@ -218,7 +218,7 @@ fn names_are_only_names() {
     assert_eq!(names(""), ["d.csv", "in", "m.yaml"]);
     assert_eq!(names("in"), ["side"]);
     assert_eq!(names("in/side"), ["m.yaml", "run"]);
-    let page = fs::read_to_string(place.join("in/side/run/report.html")).expect("a page");
+    let page = fs::read_to_string(position.join("in/side/run/report.html")).expect("a page");
     assert!(
         !page.contains("<script>alert") && page.contains("&lt;script&gt;alert"),
         "not escaped"

@@ -148,9 +148,9 @@ fn kind(text: &str) -> String {
 /// A YAML text with aliases after a valid model: read again with an override, and searched for its data files, as the commands
 /// do.
 pub fn yaml(bytes: &[u8]) -> Verdict {
-    let place = workshop().path("models/m.yaml");
+    let location = workshop().path("models/m.yaml");
     let text = String::from_utf8_lossy(bytes);
-    let file = match ModelFile::parse(&place, text) {
+    let file = match ModelFile::parse(&location, text) {
         Ok(file) => file,
         Err(error) => return told(&error),
     };
@@ -169,11 +169,11 @@ pub fn yaml(bytes: &[u8]) -> Verdict {
 /// `KEY=VALUE` applied to a model.
 pub fn overrides(bytes: &[u8]) -> Verdict {
     let text = String::from_utf8_lossy(bytes);
-    let place = workshop().path("models/m.yaml");
+    let location = workshop().path("models/m.yaml");
     let model = "format: 1\nexperiments:\n  - {data: ../data/paper.csv, initial: {displacement: 3.3, velocity: \
                  1.0}}\ngrid: {nodes: 16}\nfunctions: {mass: {basis: nodal, start: 2}, damping: {fixed: 0}, \
                  stiffness: {fixed: 1}}\n";
-    let file = ModelFile::parse(&place, model).expect("a model");
+    let file = ModelFile::parse(&location, model).expect("a model");
     let change = match Override::parse(&text) {
         Ok(change) => change,
         Err(error) => return told(&error),
@@ -189,9 +189,9 @@ pub fn overrides(bytes: &[u8]) -> Verdict {
 
 /// A model file: parsed, built in every mode, and evaluated once.
 pub fn model(bytes: &[u8]) -> Verdict {
-    let place = workshop().path("models/m.yaml");
+    let location = workshop().path("models/m.yaml");
     let text = String::from_utf8_lossy(bytes);
-    let mut file = match ModelFile::parse(&place, text) {
+    let mut file = match ModelFile::parse(&location, text) {
         Ok(file) => file,
         Err(error) => return told(&error),
     };

@@ -65,11 +65,11 @@ fn text_is_allowed_in_unused_columns() {
 #[test]
 fn places_have_the_line() {
     let table = table("t\n0\n# no\n1\n");
-    let Location::Row { line, .. } = table.place(1, None) else {
+    let Location::Row { line, .. } = table.location(1, None) else {
         panic!("a row")
     };
     assert_eq!(line, 4);
-    table.place(7, Some("t"));
+    table.location(7, Some("t"));
 }
 
 #[test]

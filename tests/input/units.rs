@@ -15,8 +15,8 @@ fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), St
          {{basis: constant, start: 2}}, damping: {{fixed: 0}}, stiffness: {{fixed: 1}}}}\n"
     );
     let said = |error: kmcfit::error::InputError| {
-        let place = format!("{}/", folder.path().display());
-        error.to_string().replace(&place, "")
+        let location = format!("{}/", folder.path().display());
+        error.to_string().replace(&location, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
     let model = build(&file, BuildMode::Fit).map_err(said)?;

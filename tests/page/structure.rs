@@ -153,12 +153,14 @@ fn a_study_shows_findings_beside_their_charts() {
     let anchors: Vec<&str> = all(&page, "section")
         .filter_map(|n| n.attribute("id"))
         .collect();
-    let place = |anchor: &str| {
-        let place = anchors.iter().position(|other| *other == anchor);
-        place.unwrap_or_else(|| panic!("{anchor} in {anchors:?}"))
+    let location = |anchor: &str| {
+        let location = anchors.iter().position(|other| *other == anchor);
+        location.unwrap_or_else(|| panic!("{anchor} in {anchors:?}"))
     };
-    assert!(place("starts") < place("candidates"));
-    assert!(place("candidates") < place("bands") && place("bands") < place("sensitivity"));
+    assert!(location("starts") < location("candidates"));
+    assert!(
+        location("candidates") < location("bands") && location("bands") < location("sensitivity")
+    );
     let beside = |id: &str| {
         let figure = page.descendants().find(|n| n.attribute("id") == Some(id));
         let figure = figure.unwrap_or_else(|| panic!("{id}"));

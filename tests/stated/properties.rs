@@ -251,10 +251,10 @@ fn attributes() {
                 _ => Property::Number(value),
             };
             let both = [&[][..], &[(name, property)]];
-            let place = usize::from(is_outside);
+            let position = usize::from(is_outside);
             tdms(&[
-                ("/'g'", both[place], &[]),
-                ("/'g'/'force'", both[1 - place], &samples),
+                ("/'g'", both[position], &[]),
+                ("/'g'/'force'", both[1 - position], &samples),
             ])
         } else {
             let mut file = FileBuilder::new();

@@ -173,7 +173,7 @@ impl ProblemParts {
         let mut indices = sensors
             .chain(record.initial_parameters.iter().copied())
             .flatten();
-        let mut places = record.channels.iter().flat_map(|c| c.places());
+        let mut positions = record.channels.iter().flat_map(|c| c.positions());
         let excitation = record.excitation.as_ref();
         let structure = &self.system.structure;
         let components = structure.components();
@@ -199,7 +199,7 @@ impl ProblemParts {
             () if excitation.is_some_and(|e| !e.covers(record.nodes)) => {
                 Some("a force or base that ends before it does")
             }
-            () if places.any(|place| place.step + 1 >= record.nodes) => {
+            () if positions.any(|position| position.step + 1 >= record.nodes) => {
                 Some("a measurement after its last node")
             }
             () => None,
@@ -317,9 +317,9 @@ impl Problem {
     pub fn coefficient(&self, kind: CoefficientKind, theta: &[f64]) -> Option<Vec<f64>> {
         let functions = &self.functions;
         let mut shared = functions.coefficient_set(0).iter();
-        let place = shared.position(|f| functions.get(*f).quantity == kind)?;
+        let position = shared.position(|f| functions.get(*f).quantity == kind)?;
         let nodal = functions.nodal(theta);
-        nodal.functions().nth(place).map(<[f64]>::to_vec)
+        nodal.functions().nth(position).map(<[f64]>::to_vec)
     }
 
     /// Start parameters.
@@ -384,9 +384,11 @@ impl Problem {
             if experiment.input_error.is_some() || experiment.channels.iter().any(is_delayed) {
                 continue;
             }
-            let places = experiment.channels.iter().flat_map(Channel::places);
+            let positions = experiment.channels.iter().flat_map(Channel::positions);
             // Three nodes at least, for the curvature of a response.
-            let steps = places.map(|place| place.step + 1).fold(2, usize::max);
+            let steps = positions
+                .map(|position| position.step + 1)
+                .fold(2, usize::max);
             experiment.nodes = experiment.nodes.min(steps + 1);
             experiment.excitation = (experiment.excitation.as_ref()).map(|all| all.first(steps));
         }

@@ -36,8 +36,8 @@ pub(crate) fn root(value: impl Fn(f64) -> f64, ends: [f64; 2], tolerance: f64) -
 /// A minimum between two ends, to about three times `tolerance`, and the value there.
 pub(crate) fn minimum(value: impl Fn(f64) -> f64, ends: [f64; 2], tolerance: f64) -> (f64, f64) {
     let solver = BrentOpt::new(ends[0], ends[1]).set_tolerance(f64::EPSILON.sqrt(), tolerance);
-    let place = best(&value, solver).unwrap_or(ends[0]);
-    (place, value(place))
+    let position = best(&value, solver).unwrap_or(ends[0]);
+    (position, value(position))
 }
 
 #[cfg(test)]
@@ -49,8 +49,8 @@ mod tests {
         let found = root(|x| x.exp() - 3.0, [-4.0, 7.0], 1e-9);
         assert!((found.expect("a change of sign") - 3f64.ln()).abs() < 1e-8);
         assert_eq!(root(|x| x * x + 1.0, [-1.0, 1.0], 1e-9), None);
-        let (place, value) = minimum(|x| (x - 0.03f64.ln()).powi(2) + 5.0, [-9.0, 0.0], 1e-3);
-        assert!((place - 0.03f64.ln()).abs() < 4e-3, "{place}");
+        let (position, value) = minimum(|x| (x - 0.03f64.ln()).powi(2) + 5.0, [-9.0, 0.0], 1e-3);
+        assert!((position - 0.03f64.ln()).abs() < 4e-3, "{position}");
         assert!((value - 5.0).abs() < 2e-5, "{value}");
     }
 }

@@ -9,7 +9,7 @@ use std::collections::HashSet;
 use std::fmt::Write;
 
 /// Most further paths of a key that are listed.
-const MOST_PLACES: usize = 4;
+const MOST_PATHS: usize = 4;
 
 /// Documentation of the keys with a name or a path: `tolerance`, `fit.stop`, `experiments[0].sigma`. Without a name, a list
 /// of the top-level keys.
@@ -108,7 +108,7 @@ fn entry(found: &Found, wanted: &str) -> String {
     row("example", &format!("{}: {}", key.name, key.example));
     let others = &paths[1..];
     if !others.is_empty() {
-        let shown = &others[..others.len().min(MOST_PLACES)];
+        let shown = &others[..others.len().min(MOST_PATHS)];
         let more = match others.len() - shown.len() {
             0 => String::new(),
             more => format!(" and {more} more"),

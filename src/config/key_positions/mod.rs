@@ -11,7 +11,7 @@ mod walk;
 
 pub use path::{Segment, key_path};
 pub use position::Position;
-pub(super) use position::place;
+pub(super) use position::location;
 
 use serde::de::{Deserialize, DeserializeSeed, IgnoredAny};
 use std::cell::Cell;

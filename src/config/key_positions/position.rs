@@ -27,7 +27,7 @@ impl Position {
 }
 
 /// A position in a file as the location of an error.
-pub(in crate::config) fn place(file: &Path, position: Position) -> Location {
+pub(in crate::config) fn location(file: &Path, position: Position) -> Location {
     Location::Line {
         file: file.to_path_buf(),
         line: position.line,

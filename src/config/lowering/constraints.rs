@@ -1,6 +1,6 @@
 //! Constraints of a model file, with their columns at the nodes.
 
-use super::Place;
+use super::ModelKey;
 use super::functions::read_column;
 use crate::config::ModelFile;
 use crate::error::InputError;
@@ -15,7 +15,7 @@ pub(super) fn all(
     let mut list = file.spec.constraints.clone();
     for (i, spec) in list.iter_mut().flatten().enumerate() {
         for (name, bound) in [("min", &mut spec.min), ("max", &mut spec.max)] {
-            let at = Place::new(file, format!("constraints[{i}].{name}"));
+            let at = ModelKey::new(file, format!("constraints[{i}].{name}"));
             bound
                 .iter_mut()
                 .try_for_each(|bound| read_column(&at, grid, bound))?;

@@ -1,6 +1,6 @@
 //! Coefficient functions of a model file with their columns at the nodes, and the true coefficients.
 
-use super::Place;
+use super::ModelKey;
 use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::error::InputError;
@@ -55,7 +55,7 @@ pub(super) struct Defaults<'a> {
 /// The function at `key` with its columns at the nodes; where a start is left out, that of the record; if the fit is limited, an
 /// estimated mass without `min` has a lower bound of [`LEAST_MASS`] times its smallest start value.
 pub(super) fn specification(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     grid: &Grid,
     (kind, given): Given<'_>,
     defaults: Defaults<'_>,
@@ -121,7 +121,7 @@ pub(super) fn specification(
 
 /// Replaces a column of a file by its values at the nodes.
 pub(super) fn read_column(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     grid: &Grid,
     given: &mut NumberOrColumn,
 ) -> Result<(), InputError> {
@@ -166,7 +166,7 @@ pub(super) fn check_unknown_mass(file: &ModelFile, problem: &Problem) -> Result<
 
 /// A column named by `key`, interpolated at the nodes.
 fn column_history(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     grid: &Grid,
     given: &ColumnSpec,
 ) -> Result<TimeHistory, InputError> {
@@ -178,7 +178,7 @@ fn column_history(
 
 /// A constant, or a column named by `key`, interpolated at the nodes.
 pub(super) fn history(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     grid: &Grid,
     given: &NumberOrColumn,
 ) -> Result<TimeHistory, InputError> {
@@ -191,7 +191,7 @@ pub(super) fn history(
 
 /// Values at the nodes: a constant, or a column named by `key`.
 pub(super) fn values(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     grid: &Grid,
     given: &NumberOrColumn,
 ) -> Result<Vec<f64>, InputError> {
@@ -202,7 +202,7 @@ pub(super) fn values(
 }
 
 /// Nodal values of a column named by `key`.
-fn column(at: &Place<'_>, grid: &Grid, given: &ColumnSpec) -> Result<Vec<f64>, InputError> {
+fn column(at: &ModelKey<'_>, grid: &Grid, given: &ColumnSpec) -> Result<Vec<f64>, InputError> {
     let data = (&*given.data, &at.below("data"));
     column_on_grid(data, (&given.column, &at.below("column")), grid)
 }
@@ -215,7 +215,7 @@ pub(super) fn truth(
     let Some(spec) = &file.spec.truth else {
         return Ok(None);
     };
-    let at = Place::new(file, "truth");
+    let at = ModelKey::new(file, "truth");
     let column = |(kind, _): Given| {
         let named = spec.columns.as_ref().and_then(|columns| columns.get(kind));
         let name = named.map_or_else(|| kind.column(false), |name| name.clone());

@@ -5,8 +5,8 @@ mod experiments;
 mod fit;
 mod functions;
 mod grid;
+mod model_key;
 mod on_grid;
-mod place;
 mod refinement;
 mod starts;
 mod study;
@@ -15,7 +15,7 @@ pub(in crate::config) use experiments::known_stretches;
 pub(super) use experiments::sensor_of;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
-use place::Place;
+use model_key::ModelKey;
 pub use refinement::AutomaticGrid;
 pub use study::StudyPlan;
 
@@ -54,7 +54,7 @@ pub struct Model {
     /// Notes for reports on the channels of each experiment.
     pub notes: Vec<Vec<ChannelNote>>,
     /// Index in the file of each experiment of the problem, which has no validation records.
-    pub places: Vec<usize>,
+    pub positions: Vec<usize>,
     /// Validation records.
     pub validation: Vec<HoldOut>,
     /// Initial states of the predictions.
@@ -149,7 +149,7 @@ fn builder(
     };
     let shared = functions::shared(file).into_iter();
     let shared = shared.map(|given| {
-        let at = Place::new(file, format!("functions.{}", given.0.name()));
+        let at = ModelKey::new(file, format!("functions.{}", given.0.name()));
         let spec = functions::specification(&at, grid, given, defaults)?;
         Ok((given.0, spec))
     });
@@ -193,8 +193,10 @@ fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) 
     let mut last: Option<(usize, &str)> = None;
     let mut rows = Vec::new();
     for (name, key) in &contradiction.constraints {
-        let place = key.as_ref().map(|key| (key, file.error_at(key, "").place));
-        let Some((key, Location::Line { line, .. })) = place else {
+        let location = key
+            .as_ref()
+            .map(|key| (key, file.error_at(key, "").location));
+        let Some((key, Location::Line { line, .. })) = location else {
             rows.push(format!("`{name}`"));
             continue;
         };
@@ -324,7 +326,7 @@ fn build_on(
             .and_then(|fit| fit.refinement)
             .unwrap_or(true),
         truth,
-        places: notes.iter().map(|(i, _)| *i).collect(),
+        positions: notes.iter().map(|(i, _)| *i).collect(),
         notes: notes.into_iter().map(|(_, notes)| notes).collect(),
         validation: (built.validation.into_iter().zip(own))
             .map(|((experiment, scalars), (_, notes))| HoldOut {

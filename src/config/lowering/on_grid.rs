@@ -1,6 +1,6 @@
 //! Coefficient functions given as CSV columns, interpolated at the nodes.
 
-use super::Place;
+use super::ModelKey;
 use crate::error::InputError;
 use crate::tables::{Table, TableFormat, increasing};
 use crate::units::Measurand;
@@ -13,8 +13,8 @@ const SAME_TIME: f64 = 1e-6;
 
 /// A column of a data file, both with their keys in the model file, at the nodes: unchanged if its rows are the nodes, else interpolated linearly.
 pub(super) fn column_on_grid(
-    (data, data_at): (&str, &Place<'_>),
-    (column, column_at): (&str, &Place<'_>),
+    (data, data_at): (&str, &ModelKey<'_>),
+    (column, column_at): (&str, &ModelKey<'_>),
     grid: &Grid,
 ) -> Result<Vec<f64>, InputError> {
     let about_data = data_at.asks_for();

@@ -7,7 +7,7 @@
 //! k = m (2 pi f)^2,    c = 2 zeta sqrt(k m)
 //! ```
 
-use super::Place;
+use super::ModelKey;
 use super::experiments::{RawChannel, RawRecord, is_held_out};
 use super::functions::{self, RecordStarts};
 use crate::config::ModelFile;
@@ -68,7 +68,7 @@ pub(super) fn of_records(
 fn stated(file: &ModelFile, grid: &Grid, kind: CoefficientKind) -> Option<f64> {
     let shared = functions::shared(file);
     let (_, given) = shared.iter().find(|(other, _)| *other == kind)?;
-    let at = Place::new(file, format!("functions.{}", kind.name()));
+    let at = ModelKey::new(file, format!("functions.{}", kind.name()));
     let of_column = |part: &str, column: ColumnSpec| {
         let column = NumberOrColumn::Column(column);
         let values = functions::values(&at.below(part), grid, &column).ok()?;

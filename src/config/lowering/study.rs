@@ -3,7 +3,7 @@
 use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
@@ -66,7 +66,7 @@ const EXTREME_TIMES: usize = 5;
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
     let none = StudySpec::default();
     let spec = file.spec.study.as_ref().unwrap_or(&none);
-    let at = Place::new(file, "study");
+    let at = ModelKey::new(file, "study");
     let confidence = (spec.confidence, CONFIDENCE);
     let confidence = within(&at, "confidence", confidence, |x| x > 0.0 && x < 1.0)?;
     let spread = (spec.spread, SPREAD);
@@ -105,11 +105,11 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
 
 /// Reads a list of `study`.
 fn each<S, T>(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     problem: &Problem,
     name: &str,
     list: Option<&[S]>,
-    read: fn(&Place<'_>, &Problem, &S) -> Result<T, InputError>,
+    read: fn(&ModelKey<'_>, &Problem, &S) -> Result<T, InputError>,
 ) -> Result<Vec<T>, InputError> {
     let list = list.unwrap_or_default().iter().enumerate();
     list.map(|(i, spec)| read(&at.below(&format!("{name}[{i}]")), problem, spec))
@@ -117,7 +117,7 @@ fn each<S, T>(
 }
 
 /// Refuses an invalid limit, count or time.
-fn check(at: &Place<'_>, spec: &StudySpec) -> Result<(), InputError> {
+fn check(at: &ModelKey<'_>, spec: &StudySpec) -> Result<(), InputError> {
     if let Some(level) = spec.misfit_limit.filter(|l| *l <= 0.0) {
         return Err(at
             .error_in("misfit_limit", "the largest J must be positive")
@@ -152,7 +152,7 @@ fn check(at: &Place<'_>, spec: &StudySpec) -> Result<(), InputError> {
 }
 
 fn equivalent(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     problem: &Problem,
     spec: &EquivalentSpec,
 ) -> Result<Choice, InputError> {
@@ -175,7 +175,7 @@ fn equivalent(
 }
 
 fn within(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     key: &str,
     (given, usual): (Option<f64>, f64),
     fits: fn(f64) -> bool,
@@ -194,7 +194,11 @@ fn within(
 }
 
 /// Times on the grid; evenly spread where none are given.
-fn extremes(at: &Place<'_>, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
+fn extremes(
+    at: &ModelKey<'_>,
+    problem: &Problem,
+    spec: &StudySpec,
+) -> Result<Vec<f64>, InputError> {
     let grid = &problem.system.grid;
     let Some(given) = &spec.extremes else {
         let time =
@@ -208,7 +212,7 @@ fn extremes(at: &Place<'_>, problem: &Problem, spec: &StudySpec) -> Result<Vec<f
     Ok(given.values().to_vec())
 }
 
-fn on_grid(at: &Place<'_>, problem: &Problem, time: f64) -> Result<(), InputError> {
+fn on_grid(at: &ModelKey<'_>, problem: &Problem, time: f64) -> Result<(), InputError> {
     let grid = &problem.system.grid;
     match kmcfit_core::internals::system::TimePoint::of(grid, time) {
         Some(_) => Ok(()),
@@ -223,7 +227,7 @@ fn on_grid(at: &Place<'_>, problem: &Problem, time: f64) -> Result<(), InputErro
     }
 }
 
-fn target(at: &Place<'_>, problem: &Problem, spec: &ProfileSpec) -> Result<Target, InputError> {
+fn target(at: &ModelKey<'_>, problem: &Problem, spec: &ProfileSpec) -> Result<Target, InputError> {
     let mean = spec.mean == Some(true);
     match (spec.function, &spec.parameter) {
         (Some(name), None) => {
@@ -268,7 +272,7 @@ fn target(at: &Place<'_>, problem: &Problem, spec: &ProfileSpec) -> Result<Targe
 
 /// The index of a fitted function common to all experiments.
 fn function(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     problem: &Problem,
     quantity: CoefficientKind,
 ) -> Result<usize, InputError> {
@@ -289,7 +293,7 @@ fn function(
 }
 
 fn candidate(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     problem: &Problem,
     spec: &CandidateSpec,
 ) -> Result<Experiment, InputError> {

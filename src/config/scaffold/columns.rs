@@ -136,7 +136,7 @@ impl ColumnAssignment {
     /// Assigns a column to its role. Among several axes of a sensor a later one replaces an earlier one if its standard deviation is much
     /// larger.
     fn take(&mut self, table: &Table, column: UsedColumn) -> Result<(), InputError> {
-        let Some(place) = self.used.iter().position(|c| c.role == column.role) else {
+        let Some(location) = self.used.iter().position(|c| c.role == column.role) else {
             self.used.push(column);
             return Ok(());
         };
@@ -145,7 +145,7 @@ impl ColumnAssignment {
             let samples: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
             Ok(c.factor() * standard_deviation(&samples))
         };
-        let there = &self.used[place];
+        let there = &self.used[location];
         let alike = column.has_unit == there.has_unit
             && column.unit.is_angular() == there.unit.is_angular();
         let moves_more = column.role.is_channel() && size(&column)? > MUCH * size(there)?;
@@ -154,7 +154,7 @@ impl ColumnAssignment {
             false => column.is_stated,
         };
         let left = match is_better {
-            true => std::mem::replace(&mut self.used[place], column),
+            true => std::mem::replace(&mut self.used[location], column),
             false => column,
         };
         self.unused.push(left.index);
@@ -179,8 +179,8 @@ impl ColumnAssignment {
         let is_counter = |i: usize| self.sample_rate.is_some() && increasing_at(table, i).is_ok();
         let is_open = |i: &usize| !is_foreign(table.quantity_name(*i)) && !is_counter(*i);
         let has_no_unit = |i: &usize| is_open(i) && table.unit(*i).is_none();
-        let place = self.unused.iter().position(has_no_unit);
-        let Some(place) = place.or_else(|| self.unused.iter().position(is_open)) else {
+        let location = self.unused.iter().position(has_no_unit);
+        let Some(location) = location.or_else(|| self.unused.iter().position(is_open)) else {
             let names = (0..table.width()).map(|i| table.label(i));
             return Err(InputError::file(
                 table.path(),
@@ -192,7 +192,7 @@ impl ColumnAssignment {
             ))
             .expected("a column of samples in addition to the times"));
         };
-        let index = self.unused.remove(place);
+        let index = self.unused.remove(location);
         let own = UsedColumn::guessed(index, role.unwrap_or(Role::Displacement));
         let unit = table.stated_unit(index).explicit(own.role.kind());
         self.used.push(UsedColumn {

@@ -203,17 +203,17 @@ impl ColumnStatements {
             };
             found.roles.push((index, role));
         }
-        for (place, entry) in statements.units.iter().enumerate() {
+        for (location, entry) in statements.units.iter().enumerate() {
             let index = match Role::ALL.iter().find(|role| role.key() == entry.name) {
                 Some(role) => {
                     let unit = parse(role.kind(), &entry.unit, None)?;
-                    found.quantities.push((place, *role, unit));
+                    found.quantities.push((location, *role, unit));
                     continue;
                 }
                 None => column_of(table, &entry.name),
             };
             if let Some(index) = index {
-                found.is_used[place] = true;
+                found.is_used[location] = true;
                 let own = known(table, index);
                 found.state(index, own, &entry.unit)?;
             }
@@ -294,10 +294,10 @@ impl ColumnStatements {
 
     /// States the units by quantity.
     pub fn state_quantities(&mut self, columns: &mut [UsedColumn]) {
-        for (place, role, unit) in &self.quantities {
+        for (location, role, unit) in &self.quantities {
             if let Some(column) = columns.iter_mut().find(|column| column.role == *role) {
                 column.state(*unit);
-                self.is_used[*place] = true;
+                self.is_used[*location] = true;
             }
         }
     }
@@ -306,7 +306,7 @@ impl ColumnStatements {
 /// A unit with a factor, for the option `--units`.
 fn parse(kind: Measurand, text: &str, in_file: Option<Unit>) -> Result<ScaledUnit, InputError> {
     ScaledUnit::parse(kind, text, in_file).map_err(|error| InputError {
-        place: InputError::argument("--units", "").place,
+        location: InputError::argument("--units", "").location,
         problem: format!("{} of the {}", error.problem, kind.name()),
         ..error
     })

@@ -145,10 +145,10 @@ impl Ruler {
 
     /// Position of a value as a share of the axis; NaN if it cannot be drawn.
     pub fn share(&self, value: f64) -> f64 {
-        self.place(even(self.scale, value))
+        self.location(even(self.scale, value))
     }
 
-    fn place(&self, even: f64) -> f64 {
+    fn location(&self, even: f64) -> f64 {
         (even - self.range.0) / (self.range.1 - self.range.0)
     }
 
@@ -159,7 +159,7 @@ impl Ruler {
         match self.scale {
             Scale::Linear => linear_ticks(self.range, most)
                 .map(|(value, label)| Tick {
-                    share: self.place(value),
+                    share: self.location(value),
                     label,
                 })
                 .collect(),
@@ -183,7 +183,7 @@ impl Ruler {
         let (first, last) = ((low - FLAT).ceil() as i64, (high + FLAT).floor() as i64);
         let stride = (last - first).div_euclid(most as i64) + 1;
         let decades = (first..=last).map(|exponent| Tick {
-            share: self.place(exponent as f64),
+            share: self.location(exponent as f64),
             label: match exponent.rem_euclid(stride) {
                 0 => text::decade(exponent),
                 _ => String::new(),
@@ -193,8 +193,8 @@ impl Ruler {
         let between = between.flat_map(|exponent| {
             (2..10).map(move |digit| exponent as f64 + f64::from(digit).log10())
         });
-        let between = between.map(|place| Tick {
-            share: self.place(place),
+        let between = between.map(|location| Tick {
+            share: self.location(location),
             label: String::new(),
         });
         let inside = between.filter(|tick| (0.0..=1.0).contains(&tick.share));

@@ -94,10 +94,10 @@ pub(super) fn draw(
         }
         lines[0] += &format!("M{at:.2} {bottom}V{top}");
         if has_labels {
-            let place = (at, bottom + 8.0 + 0.5 * TICK_SIZE);
+            let position = (at, bottom + 8.0 + 0.5 * TICK_SIZE);
             words(
                 body,
-                place,
+                position,
                 &tick.label,
                 TICK_SIZE,
                 " text-anchor=\"middle\"",

@@ -195,8 +195,8 @@ impl Mark {
     }
 
     /// Dots at places that are no longer needed: a long record has few copies of its samples.
-    pub fn points_of(label: impl Into<String>, places: [Vec<f64>; 2], style: Style) -> Self {
-        Self::of(MarkKind::Points, label, places, style.dash(Dash::Solid))
+    pub fn points_of(label: impl Into<String>, positions: [Vec<f64>; 2], style: Style) -> Self {
+        Self::of(MarkKind::Points, label, positions, style.dash(Dash::Solid))
     }
 
     /// Lines from zero to the points.

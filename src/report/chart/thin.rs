@@ -40,10 +40,10 @@ fn columns(
     let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
     let column = |x: f64| (columns * (even(scale, x) - low) / (high - low)).floor();
     let bound = |column: f64| {
-        let place = low + column / columns * (high - low);
+        let position = low + column / columns * (high - low);
         match scale {
-            Scale::Linear => place,
-            Scale::Log => 10f64.powf(place),
+            Scale::Linear => position,
+            Scale::Log => 10f64.powf(position),
         }
     };
     let x = &x[..count];

@@ -64,8 +64,8 @@ pub(super) fn number(x: f64) -> String {
         _ if !x.is_finite() => "unknown".into(),
         0.0 => "0".into(),
         _ if (1e-3..1e5).contains(&size) => {
-            let places = (4 - size.log10().floor() as i32).clamp(0, 8) as usize;
-            format!("{x:.places$}")
+            let positions = (4 - size.log10().floor() as i32).clamp(0, 8) as usize;
+            format!("{x:.positions$}")
         }
         _ => {
             let text = format!("{x:.4e}");

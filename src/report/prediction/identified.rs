@@ -64,7 +64,7 @@ pub(super) fn system_of(run: &Run, sensors: &[&RunSensor]) -> Result<SystemOfRun
     let mut functions = Vec::new();
     let mut indices = Vec::new();
     let mut known_parts = Vec::new();
-    for (place, name) in names.iter().enumerate() {
+    for (location, name) in names.iter().enumerate() {
         let stored = parameters.functions.iter().find(|f| f.name == *name);
         let stored = stored.ok_or_else(|| damaged(run, &format!("no function `{name}`")))?;
         functions.push(function(run, &parameters, stored, name, false)?);
@@ -75,20 +75,20 @@ pub(super) fn system_of(run: &Run, sensors: &[&RunSensor]) -> Result<SystemOfRun
                 .functions
                 .iter()
                 .filter(|f| f.name == part)
-                .map(|f| (place, f)),
+                .map(|f| (location, f)),
         );
     }
     let first = functions.len();
-    let mut places = Vec::new();
-    for (i, (place, stored)) in known_parts.into_iter().enumerate() {
-        functions.push(function(run, &parameters, stored, names[place], true)?);
+    let mut positions = Vec::new();
+    for (i, (location, stored)) in known_parts.into_iter().enumerate() {
+        functions.push(function(run, &parameters, stored, names[location], true)?);
         indices.extend(stored.first..stored.first + stored.count);
-        places.push((place, first + i));
+        positions.push((location, first + i));
     }
     let mut scalars: Vec<ScalarParameter> = Vec::new();
     for name in sensors.iter().flat_map(|sensor| sensor.estimated()) {
-        let place = parameters.names.iter().position(|known| known == name);
-        if let Some(index) = place.filter(|index| !indices.contains(index)) {
+        let location = parameters.names.iter().position(|known| known == name);
+        if let Some(index) = location.filter(|index| !indices.contains(index)) {
             indices.push(index);
             scalars.push(ScalarParameter {
                 name: name.to_owned(),
@@ -99,7 +99,7 @@ pub(super) fn system_of(run: &Run, sensors: &[&RunSensor]) -> Result<SystemOfRun
             });
         }
     }
-    let set = CoefficientSet::from((0..first).collect::<Vec<usize>>()).with_known_parts(places);
+    let set = CoefficientSet::from((0..first).collect::<Vec<usize>>()).with_known_parts(positions);
     let covariance = parameters.covariance.as_ref().map(|rows| {
         let n = indices.len();
         DMatrix::from_fn(n, n, |i, j| rows[indices[i]][indices[j]])

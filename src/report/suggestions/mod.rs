@@ -70,11 +70,11 @@ impl Suggestion {
     }
 
     /// With the experiments by their numbers in the file, given those of the experiments of the document.
-    fn in_file(mut self, places: &[usize]) -> Self {
+    fn in_file(mut self, positions: &[usize]) -> Self {
         let number = |text: &str| {
             let (i, key) = text.strip_prefix("experiments.")?.split_once('.')?;
-            let place = places.get(i.parse::<usize>().ok()?)?;
-            Some(format!("experiments.{place}.{key}"))
+            let position = positions.get(i.parse::<usize>().ok()?)?;
+            Some(format!("experiments.{position}.{key}"))
         };
         if let Step::Change(overrides) = &mut self.step {
             for text in overrides {
@@ -130,7 +130,7 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     steps.extend(about_constants(document));
     steps.extend(about_rank(document));
     let mut in_file: Vec<Suggestion> = Vec::new();
-    for step in steps.into_iter().map(|step| step.in_file(&model.places)) {
+    for step in steps.into_iter().map(|step| step.in_file(&model.positions)) {
         // Several findings may ask for one change.
         let is_new = |known: &Suggestion| known.step != step.step || step.step == Step::Outside;
         if in_file.iter().all(is_new) {
@@ -170,7 +170,7 @@ fn of_channel(
 }
 
 /// Number of the experiment with this name.
-fn place(document: &ResultDocument, experiment: &str) -> Option<usize> {
+fn position(document: &ResultDocument, experiment: &str) -> Option<usize> {
     document
         .experiments
         .iter()
@@ -188,7 +188,7 @@ fn about_codes(model: &Model) -> Option<Suggestion> {
     let overrides = model.missing_codes().filter_map(|(name, codes)| {
         let mut experiments = model.problem.experiments.iter();
         let i = model
-            .places
+            .positions
             .get(experiments.position(|e| e.name == name)?)?;
         Some(format!("experiments.{i}.missing={codes}"))
     });
@@ -281,7 +281,7 @@ fn about_means(document: &ResultDocument) -> Option<Suggestion> {
         _ => None,
     });
     let (_, channel, experiment) = means.max_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
-    let i = place(document, experiment)?;
+    let i = position(document, experiment)?;
     Some(Suggestion::change(
         "estimate_offset",
         format!("{channel} of {experiment}: estimate the offset of the sensor"),

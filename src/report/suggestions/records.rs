@@ -1,6 +1,6 @@
 //! Suggestions about records and their inputs.
 
-use super::{Suggestion, of_channel, place, written};
+use super::{Suggestion, of_channel, position, written};
 use crate::config::Model;
 use crate::number_format::significant;
 use crate::report::document::ResultDocument;
@@ -53,7 +53,7 @@ pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<
             ))
         }
         RecordError::InputSign { experiment } => {
-            let i = place(document, experiment)?;
+            let i = position(document, experiment)?;
             let channels = document.experiments[i].channels.iter();
             let gains = channels.map(|c| changed_gain(model, i, &c.kind, -1.0));
             Some(Suggestion::change(
@@ -68,7 +68,7 @@ pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<
             ..
         } => about_delay(document, experiment, *samples),
         RecordError::InputJump { experiment, .. } => {
-            let i = place(document, experiment)?;
+            let i = position(document, experiment)?;
             let (part, signal) = sampled_input(model, i)?;
             (signal.interpolation() != Interpolation::Hold).then(|| {
                 Suggestion::change(
@@ -94,7 +94,7 @@ pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<
 
 /// Another interpolation of the input, or an estimated delay, for a response that lags by these samples.
 fn about_delay(document: &ResultDocument, experiment: &str, samples: f64) -> Option<Suggestion> {
-    let i = place(document, experiment)?;
+    let i = position(document, experiment)?;
     let record = &document.experiments[i];
     let is_force = record.driven_by.iter().any(|d| d == "force");
     let input = if is_force { "force" } else { "base" };
@@ -144,9 +144,9 @@ pub(super) fn about_disturbance(document: &ResultDocument, model: &Model) -> Opt
     });
     if let Some(jump) = jump {
         // The jump explains the disturbance.
-        is_held(sampled_input(model, place(document, jump)?)?.1).then_some(())?;
+        is_held(sampled_input(model, position(document, jump)?)?.1).then_some(())?;
     }
-    let i = place(document, experiment)?;
+    let i = position(document, experiment)?;
     let (part, signal) = sampled_input(model, i)?;
     let is_linear = signal.interpolation() == Interpolation::Linear;
     let cubics = is_linear.then(|| format!("experiments.{i}.{part}.interpolation=cubic"));
@@ -174,7 +174,7 @@ pub(super) fn about_interpolation(document: &ResultDocument) -> Option<Suggestio
         InputQuantity::Force => "force",
         InputQuantity::BaseAcceleration => "base",
     };
-    let i = place(document, experiment)?;
+    let i = position(document, experiment)?;
     Some(Suggestion::change(
         "cubic_interpolation",
         "interpolate the input by cubics",

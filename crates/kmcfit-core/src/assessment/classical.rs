@@ -152,7 +152,7 @@ fn extremes(values: &[f64], spacing: f64, noise: f64) -> Vec<[f64; 2]> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let mut all: Vec<[f64; 2]> = Vec::new();
     let mut best: Option<usize> = None;
-    let place = |i: usize| {
+    let position = |i: usize| {
         let [a, b, c] = [values[i - 1], values[i], values[i + 1]];
         let bend = a - 2.0 * b + c;
         let shift = if bend == 0.0 {
@@ -171,7 +171,7 @@ fn extremes(values: &[f64], spacing: f64, noise: f64) -> Vec<[f64; 2]> {
                 }
             }
             Some(at) => {
-                all.push(place(at));
+                all.push(position(at));
                 best = Some(i);
             }
             None => best = Some(i),

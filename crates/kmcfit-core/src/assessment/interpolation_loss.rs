@@ -107,9 +107,9 @@ fn with_cubics(problem: &Problem, e: usize) -> Option<(InputQuantity, Signal)> {
             let grid = &problem.system.grid;
             let last = at_nodes.len().checked_sub(2)?;
             let at = |t: &f64| {
-                let place = (t - grid.start()) / grid.step();
-                let left = (place.max(0.0) as usize).min(last);
-                let share = place - left as f64;
+                let position = (t - grid.start()) / grid.step();
+                let left = (position.max(0.0) as usize).min(last);
+                let share = position - left as f64;
                 at_nodes[left] + share * (at_nodes[left + 1] - at_nodes[left])
             };
             let values = error.times.iter().map(at).collect();

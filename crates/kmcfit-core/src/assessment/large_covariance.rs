@@ -101,10 +101,11 @@ impl NormalMatrix {
     /// Shift of the parameters by the discretisation error of the time steps; zero without one.
     fn shift(&self, problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
         let predicted = problem.predicted(evaluation);
-        let roots: Vec<f64> = predicted
-            .flat_map(|(channel, predicted)| channel.majorant(predicted).roots)
+        let weight_roots: Vec<f64> = predicted
+            .flat_map(|(channel, predicted)| channel.majorant(predicted).weight_roots)
             .collect();
-        let error = step_error(problem, evaluation, &roots).filter(|e| e.len() == self.samples);
+        let error =
+            step_error(problem, evaluation, &weight_roots).filter(|e| e.len() == self.samples);
         let Some(error) = error else {
             return vec![0.0; self.parameters];
         };

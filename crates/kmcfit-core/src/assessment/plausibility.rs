@@ -324,8 +324,8 @@ fn raster(channel: &Channel) -> Option<f64> {
     let distances = times.windows(2).map(|pair| pair[1] - pair[0]);
     let spacing = distances.reduce(f64::min).filter(|s| *s > 0.0)?;
     let on_raster = |t: &f64| {
-        let place = (t - times[0]) / spacing;
-        (place - place.round()).abs() <= EVEN
+        let position = (t - times[0]) / spacing;
+        (position - position.round()).abs() <= EVEN
     };
     times.iter().all(on_raster).then_some(spacing)
 }

@@ -68,7 +68,7 @@ pub(super) struct RecordColumns {
     /// Derivatives in time of the predictions of each channel of an experiment; `None` where they are not asked for or do not exist.
     slopes: Vec<Option<Vec<Vec<f64>>>>,
     /// Roots of the weights of the samples of each channel, or the one of all.
-    roots: Vec<Vec<f64>>,
+    weight_roots: Vec<Vec<f64>>,
 }
 
 impl RecordColumns {
@@ -90,10 +90,10 @@ impl RecordColumns {
         let experiments = problem.experiments.len();
         Self {
             slopes: map(experiments, available(), of_clock),
-            roots: (problem.predicted(evaluation))
+            weight_roots: (problem.predicted(evaluation))
                 .map(|(channel, predicted)| match channel.uniform_weights() {
                     Some([inner, ends]) if inner == ends => vec![inner.sqrt()],
-                    _ => channel.majorant(predicted).roots,
+                    _ => channel.majorant(predicted).weight_roots,
                 })
                 .collect(),
         }
@@ -109,7 +109,7 @@ impl RecordColumns {
         let predictions = &evaluation.predictions;
         let start = problem.system.grid.start();
         let mut all = Vec::new();
-        let mut roots = self.roots.iter();
+        let mut weight_roots = self.weight_roots.iter();
         for (e, experiment) in problem.experiments.iter().enumerate() {
             for (c, channel) in experiment.channels.iter().enumerate() {
                 let mut rows = match parameter {
@@ -128,9 +128,11 @@ impl RecordColumns {
                     _ => vec![0.0; channel.len()],
                 };
                 channel.whiten_rows(&mut rows);
-                match roots.next()?.as_slice() {
+                match weight_roots.next()?.as_slice() {
                     [root] => rows.iter_mut().for_each(|row| *row *= root),
-                    roots => (rows.iter_mut().zip(roots)).for_each(|(row, root)| *row *= root),
+                    weight_roots => {
+                        (rows.iter_mut().zip(weight_roots)).for_each(|(row, root)| *row *= root);
+                    }
                 }
                 append(&mut all, rows);
             }

@@ -211,7 +211,7 @@ impl FinerBases {
     }
 
     /// First place of function `index` among the columns with the finer bases `finer`.
-    fn place(&self, index: usize, finer: &[usize]) -> usize {
+    fn position(&self, index: usize, finer: &[usize]) -> usize {
         let count = |i: usize| match &self.maps[i] {
             Some(map) if !finer.contains(&i) => map.ncols(),
             _ => self.problem.functions.get(i).parameters(),
@@ -231,9 +231,9 @@ impl FinerBases {
         let map = self.maps[index]
             .as_ref()
             .expect("a function with a finer basis");
-        let place = self.place(index, finer);
-        let to = after.change.rows(place, map.nrows()).into_owned();
-        let from = map * before.change.rows(place, map.ncols());
+        let position = self.position(index, finer);
+        let to = after.change.rows(position, map.nrows()).into_owned();
+        let from = map * before.change.rows(position, map.ncols());
         [to.clone(), to - from]
     }
 

@@ -68,9 +68,9 @@ fn mean_of(channel: &Channel, predicted: &[f64]) -> Option<[f64; 3]> {
         return None;
     }
     let outliers = outlier_indices(&errors);
-    let mut place = 0..;
+    let mut position = 0..;
     errors.retain(|_| {
-        place
+        position
             .next()
             .is_some_and(|i| outliers.binary_search(&i).is_err())
     });

@@ -108,9 +108,9 @@ impl RivalScreen {
         let scalars = all.split_off(self.functions);
         // The terms are in the order of all terms.
         let new = &change[own..];
-        let place = |kind: &CoefficientKind| self.kinds.iter().position(|known| known == kind);
+        let position = |kind: &CoefficientKind| self.kinds.iter().position(|known| known == kind);
         let mut sorted: Vec<&CoefficientKind> = kinds.iter().collect();
-        sorted.sort_by_key(|kind| place(kind));
+        sorted.sort_by_key(|kind| position(kind));
         let of_kind = |kind| sorted.iter().position(|sorted| *sorted == kind);
         all.extend(kinds.iter().filter_map(|kind| new.get(of_kind(kind)?)));
         all.extend(scalars);

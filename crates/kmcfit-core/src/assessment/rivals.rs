@@ -466,8 +466,8 @@ fn rival(
         }
         let kind = of_kind(function.quantity);
         let [constant, coefficient] = response.regression(&values[f], kind);
-        if let Some(place) = kinds.iter().position(|known| Some(*known) == kind) {
-            new[place] = coefficient;
+        if let Some(position) = kinds.iter().position(|known| Some(*known) == kind) {
+            new[position] = coefficient;
         }
         start.push(constant);
         list.push(CoefficientFunction {

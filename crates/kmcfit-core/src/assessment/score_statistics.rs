@@ -291,12 +291,12 @@ fn force(evaluation: &Evaluation, term: Law) -> f64 {
 /// Root mean square of the largest force term of the model.
 fn largest_force(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let mut largest = f64::MIN_POSITIVE;
-    for (place, term) in problem.system.laws().iter().enumerate() {
+    for (position, term) in problem.system.laws().iter().enumerate() {
         let mut all = Vec::new();
         for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
             let Some(values) = (evaluation.nodal_of(experiment.coefficient_set))
                 .coefficients
-                .get(place)
+                .get(position)
             else {
                 continue;
             };

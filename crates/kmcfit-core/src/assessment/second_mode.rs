@@ -353,9 +353,9 @@ impl<'a> Samples<'a> {
             each.push(self.responses(modes, [0.0; 2], speeds));
         }
         let mut columns = DMatrix::from_element(count, 2 * each.len() + 1, 1.0);
-        for (place, pair) in each.iter().enumerate() {
-            columns.set_column(place, &pair.column(0));
-            columns.set_column(each.len() + place, &pair.column(1));
+        for (position, pair) in each.iter().enumerate() {
+            columns.set_column(position, &pair.column(0));
+            columns.set_column(each.len() + position, &pair.column(1));
         }
         let observed = DVector::from_column_slice(self.observed);
         let mut normal = columns.tr_mul(&columns);

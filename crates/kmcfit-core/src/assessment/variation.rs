@@ -41,7 +41,7 @@ pub(super) fn variation_warnings(
         }
         let mut penalties = problem.penalties.iter().enumerate();
         let freedom = match penalties.find(|(_, penalty)| penalty.function == f) {
-            Some((place, _)) => effective.and_then(|all| all.get(place).copied()),
+            Some((position, _)) => effective.and_then(|all| all.get(position).copied()),
             None => Some(function.parameters() as f64),
         };
         let beside_mean = freedom.unwrap_or(1.0) - 1.0;
@@ -90,15 +90,15 @@ fn without_line(values: &[f64]) -> Option<Vec<f64>> {
     let n = values.len() as f64;
     let middle = 0.5 * (n - 1.0);
     let mean = values.iter().sum::<f64>() / n;
-    let place = |i: usize| i as f64 - middle;
+    let position = |i: usize| i as f64 - middle;
     let (mut cross, mut square) = (0.0, 0.0);
     for (i, x) in values.iter().enumerate() {
-        cross += place(i) * (x - mean);
-        square += place(i) * place(i);
+        cross += position(i) * (x - mean);
+        square += position(i) * position(i);
     }
     let slope = cross / square;
     let rest = values.iter().enumerate();
-    let rest: Vec<f64> = rest.map(|(i, x)| x - mean - slope * place(i)).collect();
+    let rest: Vec<f64> = rest.map(|(i, x)| x - mean - slope * position(i)).collect();
     rest.iter().all(|x| x.is_finite()).then_some(rest)
 }
 

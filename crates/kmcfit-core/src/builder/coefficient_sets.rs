@@ -107,7 +107,7 @@ impl Builder {
         };
         let mut of_shared = Vec::new();
         for (f, entry) in known_of(None) {
-            of_shared.push((self.shared_place(entry)?, f));
+            of_shared.push((self.shared_index(entry)?, f));
         }
         let mut found = CoefficientSets {
             sets: vec![CoefficientSet::from(shared.clone()).with_known_parts(of_shared.clone())],
@@ -127,14 +127,14 @@ impl Builder {
             }
             // The function of a record replaces the shared one with its known part.
             for entry in given.iter().filter(|entry| entry.owner == Some(i)) {
-                let place = self.shared_place(entry)?;
-                known.retain(|(other, _)| *other != place);
+                let position = self.shared_index(entry)?;
+                known.retain(|(other, _)| *other != position);
             }
             for (f, entry) in (entries.iter().enumerate()).filter(|(_, e)| e.owner == Some(i)) {
-                let place = self.shared_place(entry)?;
+                let position = self.shared_index(entry)?;
                 match entry.is_known_part {
-                    true => known.push((place, f)),
-                    false => set[place] = f,
+                    true => known.push((position, f)),
+                    false => set[position] = f,
                 }
             }
             let set = CoefficientSet::from(set).with_known_parts(known);
@@ -207,9 +207,9 @@ impl Builder {
     }
 
     /// Index of the shared function that a record replaces.
-    fn shared_place(&self, entry: &FunctionEntry) -> Result<usize, BuildError> {
+    fn shared_index(&self, entry: &FunctionEntry) -> Result<usize, BuildError> {
         let mut kinds = self.coefficients.iter().map(|(kind, _)| *kind);
-        let Some(place) = kinds.position(|kind| kind == entry.kind) else {
+        let Some(position) = kinds.position(|kind| kind == entry.kind) else {
             let name = entry.kind.name();
             return Err(
                 BuildError::new(&entry.key, "the system has no such function")
@@ -220,9 +220,9 @@ impl Builder {
             );
         };
         if entry.kind != CoefficientKind::COULOMB_FRICTION {
-            return entry.width().map(|_| place);
+            return entry.width().map(|_| position);
         }
-        let shared = self.coefficients[place].1.width;
+        let shared = self.coefficients[position].1.width;
         match entry.spec.width {
             Some(width) if shared != Some(width) => {
                 let problem = "the width of Coulomb friction is shared by all experiments";
@@ -230,7 +230,7 @@ impl Builder {
                     .found(width)
                     .expected("no `width`, or that of `functions.coulomb_friction`"))
             }
-            _ => Ok(place),
+            _ => Ok(position),
         }
     }
 }

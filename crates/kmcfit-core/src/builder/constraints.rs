@@ -290,10 +290,10 @@ pub(super) fn move_start(
 fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError {
     let mut left: Vec<&RowKey> = keys.iter().collect();
     let key_of = |name: &String| {
-        let place = left.iter().position(|row| row.name == *name);
+        let position = left.iter().position(|row| row.name == *name);
         (
             name.clone(),
-            place.map(|place| left.remove(place).key.clone()),
+            position.map(|position| left.remove(position).key.clone()),
         )
     };
     let constraints: Vec<_> = names.iter().map(key_of).collect();

@@ -29,8 +29,8 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     }
     let open_scale = |e: &Experiment| gains_open(e, &open) && starts_open(e, &open);
     let free_and_open = |e: &Experiment| e.is_free() && open_scale(e);
-    if let Some(place) = problem.experiments.iter().position(free_and_open) {
-        let name = &problem.experiments[place].name;
+    if let Some(position) = problem.experiments.iter().position(free_and_open) {
+        let name = &problem.experiments[position].name;
         let problem = format!(
             "the gain and the initial state of {name} cannot both be estimated: only their product is \
              identifiable"
@@ -38,7 +38,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
         return Err(BuildError::new("experiments", problem)
             .found(format!(
                 "no known gain, state or prior in record {}",
-                place + 1
+                position + 1
             ))
             .expected("a number for one of them, or a `prior`"));
     }

@@ -215,8 +215,8 @@ impl Builder {
                 .iter()
                 .enumerate()
                 .filter(|(_, r)| !r.validation);
-            let place = fitted.map(|(i, _)| i).nth(unsuited.experiment);
-            let key = format!("experiments[{}]", place.unwrap_or_default());
+            let position = fitted.map(|(i, _)| i).nth(unsuited.experiment);
+            let key = format!("experiments[{}]", position.unwrap_or_default());
             let problem =
                 "the method `equation-error` cannot derive the response from these samples";
             BuildError::new(key, problem)

@@ -168,8 +168,8 @@ impl Builder {
     #[must_use]
     pub fn coefficient(mut self, kind: CoefficientKind, spec: CoefficientSpec) -> Self {
         self.coefficients.retain(|(known, _)| *known != kind);
-        let place = |kind: CoefficientKind| CoefficientKind::ALL.iter().position(|k| *k == kind);
-        let is_before = |(known, _): &(CoefficientKind, _)| place(*known) < place(kind);
+        let position = |kind: CoefficientKind| CoefficientKind::ALL.iter().position(|k| *k == kind);
+        let is_before = |(known, _): &(CoefficientKind, _)| position(*known) < position(kind);
         let at = self.coefficients.partition_point(is_before);
         self.coefficients.insert(at, (kind, spec));
         self

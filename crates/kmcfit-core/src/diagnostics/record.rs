@@ -86,18 +86,18 @@ fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
         let mean = (last - first) / (times.len() - 1) as f64;
         (residuals.to_vec(), mean)
     };
-    let places = ((last - first) / step).round();
+    let positions = ((last - first) / step).round();
     // False for a step of zero or NaN.
-    let fits = places >= 0.0 && places < (PLACES_PER_READING * times.len()) as f64;
+    let fits = positions >= 0.0 && positions < (PLACES_PER_READING * times.len()) as f64;
     if !fits {
         return in_order();
     }
-    let mut sequence = vec![f64::NAN; places as usize + 1];
+    let mut sequence = vec![f64::NAN; positions as usize + 1];
     let mut before = None;
     for (time, residual) in times.iter().zip(residuals) {
-        let place = (time - first) / step;
-        let index = place.round() as usize;
-        let on_place = (place - place.round()).abs() <= OFF_GRID;
+        let position = (time - first) / step;
+        let index = position.round() as usize;
+        let on_place = (position - position.round()).abs() <= OFF_GRID;
         match sequence.get_mut(index) {
             Some(slot) if on_place && before.is_none_or(|b| b < index) => *slot = *residual,
             _ => return in_order(),

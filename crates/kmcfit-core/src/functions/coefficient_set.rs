@@ -11,7 +11,7 @@ pub struct CoefficientSet {
     functions: Vec<usize>,
     /// Number of inertias among them.
     inertias: usize,
-    /// Place of the coefficient (mass 0) and index of each known part.
+    /// VariableRole of the coefficient (mass 0) and index of each known part.
     known_parts: Vec<(usize, usize)>,
 }
 

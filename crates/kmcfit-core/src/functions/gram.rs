@@ -118,7 +118,7 @@ fn weighted_products(rows: &LocalRows, weights: &[f64]) -> CsrMatrix<f64> {
     let mut products: BTreeMap<(usize, usize), f64> = BTreeMap::new();
     let mut cell = 0..0;
     let mut sums: Vec<f64> = Vec::new();
-    let places = |cell: &Range<usize>| -> Vec<(usize, usize)> {
+    let positions = |cell: &Range<usize>| -> Vec<(usize, usize)> {
         let pairs = cell.clone().flat_map(|j| cell.clone().map(move |k| (j, k)));
         pairs.collect()
     };
@@ -126,10 +126,10 @@ fn weighted_products(rows: &LocalRows, weights: &[f64]) -> CsrMatrix<f64> {
         let (first, entries) = rows.nonzero(i);
         let own = first..first + entries.len();
         if own != cell {
-            products.extend(places(&cell).into_iter().zip(sums));
+            products.extend(positions(&cell).into_iter().zip(sums));
             cell = own;
-            let known = |place| products.get(&place).copied().unwrap_or(0.0);
-            sums = places(&cell).into_iter().map(known).collect();
+            let known = |position| products.get(&position).copied().unwrap_or(0.0);
+            sums = positions(&cell).into_iter().map(known).collect();
         }
         for (a, sums) in entries.iter().zip(sums.chunks_exact_mut(cell.len().max(1))) {
             for (b, sum) in entries.iter().zip(sums) {
@@ -137,7 +137,7 @@ fn weighted_products(rows: &LocalRows, weights: &[f64]) -> CsrMatrix<f64> {
             }
         }
     }
-    products.extend(places(&cell).into_iter().zip(sums));
+    products.extend(positions(&cell).into_iter().zip(sums));
     let mut matrix = CooMatrix::new(rows.width(), rows.width());
     for ((j, k), product) in products {
         matrix.push(j, k, product);

@@ -145,8 +145,8 @@ impl LocalRows {
         }
         for (i, y) in (0..self.len()).zip(y) {
             let (first, values) = self.stored(i);
-            let places = out[first..].iter_mut().zip(values);
-            places.for_each(|(out, a)| *out += a * y);
+            let positions = out[first..].iter_mut().zip(values);
+            positions.for_each(|(out, a)| *out += a * y);
         }
     }
 

@@ -145,7 +145,7 @@ impl CoefficientFunction {
     #[must_use]
     pub fn resampled(&self, from: &Grid, to: &Grid) -> Self {
         let last = from.nodes() - 1;
-        let place = |i: usize| {
+        let position = |i: usize| {
             let x = (to.time(i) - from.start()) / from.step();
             let x = x.clamp(0.0, last as f64);
             let step = (x as usize).min(last - 1);
@@ -155,7 +155,7 @@ impl CoefficientFunction {
             |(step, x): (usize, f64)| self.fixed_at(step) * (1.0 - x) + self.fixed_at(step + 1) * x;
         let offset = match self.offset.is_empty() {
             true => Vec::new(),
-            false => (0..to.nodes()).map(place).map(fixed_at).collect(),
+            false => (0..to.nodes()).map(position).map(fixed_at).collect(),
         };
         let design = match &self.design {
             Design::Empty => Design::Empty,
@@ -176,7 +176,7 @@ impl CoefficientFunction {
                 };
                 let span = (0..last).map(span).max().unwrap_or(1);
                 let mut rows = LocalRows::new(self.parameters(), span);
-                for (step, x) in (0..to.nodes()).map(place) {
+                for (step, x) in (0..to.nodes()).map(position) {
                     rows.push(entries(step, x).into_iter());
                 }
                 Design::Sparse(Arc::new(rows))

@@ -56,8 +56,8 @@ impl Parameterization {
             "coefficient sets with functions of the list"
         );
         let has_places = |set: &CoefficientSet| {
-            let mut places = set.known_parts().iter();
-            places.all(|(place, _)| *place < set.len())
+            let mut positions = set.known_parts().iter();
+            positions.all(|(position, _)| *position < set.len())
         };
         assert!(
             coefficient_sets.iter().all(has_places),
@@ -291,8 +291,8 @@ impl Parameterization {
                 _ => self.list[f].values_into(theta, values),
             }
         }
-        for &(place, f) in self.coefficient_sets[which].known_parts() {
-            let values = nodal.functions_mut().nth(place);
+        for &(position, f) in self.coefficient_sets[which].known_parts() {
+            let values = nodal.functions_mut().nth(position);
             let values = values.expect("a coefficient for each known part");
             let part = &self.list[f];
             (values.iter_mut().zip(part.offset.iter())).for_each(|(value, known)| *value += known);
@@ -324,8 +324,8 @@ impl Parameterization {
     /// Linear part `B theta` of coefficient set `which`, without fixed parts: its change along a direction.
     pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
         let mut nodal = self.empty_nodal();
-        for (place, f) in self.coefficient_sets[which].parts() {
-            let values = nodal.functions_mut().nth(place);
+        for (position, f) in self.coefficient_sets[which].parts() {
+            let values = nodal.functions_mut().nth(position);
             let values = values.expect("a coefficient for each part");
             let range = self.ranges[f].clone();
             self.list[f].design.multiply_add(&theta[range], values);
@@ -337,8 +337,8 @@ impl Parameterization {
     /// to parameters.
     pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
         let values: Vec<&[f64]> = nodal.functions().collect();
-        for (place, f) in self.coefficient_sets[which].parts() {
-            let values = values[place];
+        for (position, f) in self.coefficient_sets[which].parts() {
+            let values = values[position];
             let out = &mut out[self.ranges[f].clone()];
             self.list[f].design.transpose_multiply_add(values, out);
         }

@@ -290,8 +290,8 @@ pub fn classify_functions(
     let assembly = problem.functions.coefficient_set(0);
     let mass = median_size(&evaluation.nodal.inertias[0]);
     let of = |term: Law| {
-        let place = problem.system.laws().iter().position(|t| *t == term)?;
-        Some(assembly[place + 1])
+        let position = problem.system.laws().iter().position(|t| *t == term)?;
+        Some(assembly[position + 1])
     };
     let numerators = [
         (Ratio::StiffnessOverMass, of(Law::Stiffness)),

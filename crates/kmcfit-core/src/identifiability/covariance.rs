@@ -158,10 +158,10 @@ impl Information {
         evaluation: &Evaluation,
         halved: Option<Refined>,
     ) -> Self {
-        let roots = &self.sensitivity.roots;
+        let weight_roots = &self.sensitivity.weight_roots;
         let error = match halved {
-            None => step_error(problem, evaluation, roots),
-            Some(halved) => step_error::of_changes(problem, evaluation, roots, halved),
+            None => step_error(problem, evaluation, weight_roots),
+            Some(halved) => step_error::of_changes(problem, evaluation, weight_roots, halved),
         };
         match error {
             Some(error) => self.with_error(&error),
@@ -260,7 +260,7 @@ impl Information {
         if let Some(variance) = variance {
             let samples = self
                 .sensitivity
-                .roots
+                .weight_roots
                 .iter()
                 .zip(&self.sensitivity.has_sigma);
             for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(samples) {
@@ -340,13 +340,15 @@ impl Information {
     /// appear determined.
     fn variance(&self, answers: &DMatrix<f64>) -> Option<f64> {
         let s = &self.sensitivity;
-        let without: Vec<usize> = (0..s.roots.len()).filter(|i| !s.has_sigma[*i]).collect();
+        let without: Vec<usize> = (0..s.weight_roots.len())
+            .filter(|i| !s.has_sigma[*i])
+            .collect();
         if without.is_empty() {
             return None;
         }
         let squares = without
             .iter()
-            .map(|&i| (s.residuals[i] / s.roots[i]).powi(2));
+            .map(|&i| (s.residuals[i] / s.weight_roots[i]).powi(2));
         let effective: f64 = without.iter().map(|&i| answers.row(i).norm_squared()).sum();
         let left = without.len() as f64 - effective;
         let squares: f64 = squares.sum();

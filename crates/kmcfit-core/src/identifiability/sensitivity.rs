@@ -29,7 +29,7 @@ pub struct Sensitivity {
     /// Weighted residuals `sqrt(w_i) r_i`, `r = model - sample`.
     pub residuals: Vec<f64>,
     /// `sqrt(w_i)`, in the inverse unit of the channel or with the root of a second.
-    pub roots: Vec<f64>,
+    pub weight_roots: Vec<f64>,
     /// True for each sample with a standard deviation.
     pub has_sigma: Vec<bool>,
     /// Directions of the columns.
@@ -68,13 +68,13 @@ impl Sensitivity {
         directions: Directions,
         mut jacobian: DMatrix<f64>,
     ) -> Self {
-        let (mut roots, mut residuals) = (Vec::new(), Vec::new());
+        let (mut weight_roots, mut residuals) = (Vec::new(), Vec::new());
         let mut has_sigma = Vec::new();
         for (channel, predicted) in problem.predicted(evaluation) {
             let mut majorant = channel.majorant(predicted);
             let factor = channel.information_root(predicted);
-            (majorant.roots.iter_mut()).for_each(|root| *root *= factor);
-            append(&mut roots, majorant.roots);
+            (majorant.weight_roots.iter_mut()).for_each(|root| *root *= factor);
+            append(&mut weight_roots, majorant.weight_roots);
             append(&mut residuals, majorant.weighted);
             has_sigma.extend(std::iter::repeat_n(
                 channel.weighting().is_sigma(),
@@ -83,12 +83,12 @@ impl Sensitivity {
         }
         problem.whiten_rows(&mut jacobian);
         for mut column in jacobian.column_iter_mut() {
-            (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
+            (column.iter_mut().zip(&weight_roots)).for_each(|(a, root)| *a *= root);
         }
         Self {
             jacobian,
             residuals,
-            roots,
+            weight_roots,
             has_sigma,
             directions,
         }
@@ -104,7 +104,7 @@ impl Sensitivity {
         Self {
             jacobian,
             residuals,
-            roots: vec![1.0; count],
+            weight_roots: vec![1.0; count],
             has_sigma: vec![true; count],
             directions,
         }

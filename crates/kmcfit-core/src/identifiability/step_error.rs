@@ -19,16 +19,16 @@ use nalgebra::DVector;
 const SAME_STEPS: f64 = 1e-6;
 
 /// Weighted and whitened discretisation error of all predictions, in the rows of [`Sensitivity`](super::Sensitivity) with the roots
-/// `roots`; `None` where half the step cannot be simulated or the samples were simulated with the same steps.
+/// `weight_roots`; `None` where half the step cannot be simulated or the samples were simulated with the same steps.
 pub(crate) fn step_error(
     problem: &Problem,
     evaluation: &Evaluation,
-    roots: &[f64],
+    weight_roots: &[f64],
 ) -> Option<DVector<f64>> {
     of_changes(
         problem,
         evaluation,
-        roots,
+        weight_roots,
         problem.on_half_step(evaluation).ok()??,
     )
 }
@@ -37,7 +37,7 @@ pub(crate) fn step_error(
 pub(super) fn of_changes(
     problem: &Problem,
     evaluation: &Evaluation,
-    roots: &[f64],
+    weight_roots: &[f64],
     halved: Refined,
 ) -> Option<DVector<f64>> {
     let changes: Vec<Vec<f64>> = halved.changes.into_iter().flatten().collect();
@@ -46,7 +46,7 @@ pub(super) fn of_changes(
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         all & (rms(&residuals) < SAME_STEPS * rms(changes))
     });
-    let error = weighted(problem, changes, roots, richardson(problem))?;
+    let error = weighted(problem, changes, weight_roots, richardson(problem))?;
     (!is_of_these_steps).then_some(error)
 }
 
@@ -60,15 +60,18 @@ pub(super) fn richardson(problem: &Problem) -> f64 {
 pub(super) fn weighted(
     problem: &Problem,
     changes: Vec<Vec<f64>>,
-    roots: &[f64],
+    weight_roots: &[f64],
     factor: f64,
 ) -> Option<DVector<f64>> {
-    let mut error = Vec::with_capacity(roots.len());
+    let mut error = Vec::with_capacity(weight_roots.len());
     for (channel, mut changes) in problem.channels().zip(changes) {
         channel.whiten_rows(&mut changes);
         error.extend(changes);
     }
-    let error = error.iter().zip(roots).map(|(e, root)| factor * root * e);
-    let error = DVector::from_iterator(roots.len(), error);
+    let error = error
+        .iter()
+        .zip(weight_roots)
+        .map(|(e, root)| factor * root * e);
+    let error = DVector::from_iterator(weight_roots.len(), error);
     error.iter().all(|e| e.is_finite()).then_some(error)
 }

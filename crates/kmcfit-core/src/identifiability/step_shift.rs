@@ -39,7 +39,7 @@ impl Problem {
         }
         let directions = Directions::new(self, evaluation, n, n);
         let sensitivity = Sensitivity::along(self, evaluation, directions);
-        let error = weighted(self, changes, &sensitivity.roots, 1.0)?;
+        let error = weighted(self, changes, &sensitivity.weight_roots, 1.0)?;
         let active = active_rows(self, theta);
         let held: Vec<&ActiveRow> = active.iter().collect();
         let information = Information::new(self, theta, sensitivity);

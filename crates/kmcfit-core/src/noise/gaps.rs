@@ -45,9 +45,9 @@ impl Gaps {
             let mut whole = runs[..before].iter().rev().filter(|run| run.len() >= order);
             let enough = whole.next().map_or(0, |run| run.end - order);
             let first = enough.max(run.start.saturating_sub(2 * order + 1));
-            let place = |i: usize| ((times[last] - times[i]) / spacing).round() as usize;
-            let near = (first..=last).map(place);
-            let near = near.skip_while(|place| *place >= LONGEST_GAP);
+            let position = |i: usize| ((times[last] - times[i]) / spacing).round() as usize;
+            let near = (first..=last).map(position);
+            let near = near.skip_while(|position| *position >= LONGEST_GAP);
             let shape = (near.collect(), last + 1 - run.start);
             let shapes = &mut gaps.shapes;
             let found = known.entry(shape).or_insert_with_key(|shape| {
@@ -61,10 +61,10 @@ impl Gaps {
 
     /// Predictors of the first samples of each run but the first: one factorisation a shape.
     pub fn predictors(&self, process: &Autoregression, runs: &[Range<usize>]) -> Vec<Predictor> {
-        let places = self.shapes.iter().flat_map(|(places, _)| places);
-        let lags = process.autocorrelation(places.max().map_or(0, |most| most + 1));
+        let positions = self.shapes.iter().flat_map(|(positions, _)| positions);
+        let lags = process.autocorrelation(positions.max().map_or(0, |most| most + 1));
         let shapes = self.shapes.iter();
-        let found = shapes.map(|(places, count)| last_predictors(places, *count, &lags));
+        let found = shapes.map(|(positions, count)| last_predictors(positions, *count, &lags));
         let found: Vec<Vec<(Arc<[f64]>, f64)>> = found.collect();
         let of_run = |(run, shape): (&Range<usize>, &usize)| {
             let samples = (run.start..).zip(found[*shape].clone());
@@ -79,12 +79,12 @@ impl Gaps {
     }
 }
 
-/// Best linear predictors of each of the last `count` samples at `places`, in spacings before the last one, from all before it:
+/// Best linear predictors of each of the last `count` samples at `positions`, in spacings before the last one, from all before it:
 /// coefficients, the nearest sample first, and the variance of the error. Row `m` of the Cholesky factor `L` of the correlations
 /// holds both: `L_m^T c = l_m` with its part `l_m` left of the diagonal, variance `L_mm^2`.
-fn last_predictors(places: &[usize], count: usize, lags: &[f64]) -> Vec<(Arc<[f64]>, f64)> {
-    let n = places.len();
-    let matrix = DMatrix::from_fn(n, n, |i, j| lags[places[i].abs_diff(places[j])]);
+fn last_predictors(positions: &[usize], count: usize, lags: &[f64]) -> Vec<(Arc<[f64]>, f64)> {
+    let n = positions.len();
+    let matrix = DMatrix::from_fn(n, n, |i, j| lags[positions[i].abs_diff(positions[j])]);
     let Some(factor) = matrix.cholesky() else {
         return Vec::new();
     };

@@ -34,7 +34,7 @@ pub struct InputRow {
     /// With respect to the input at the time of the sample.
     pub input: f64,
     /// Index of the input sample before that time, and the fraction of the way to the next one.
-    pub place: (usize, f64),
+    pub position: (usize, f64),
 }
 
 /// The effect of errors of the input on the samples of a channel.
@@ -70,17 +70,17 @@ struct Row {
 }
 
 impl InputErrors {
-    /// No errors of the input samples; `places` are, for each node, the index of the input sample before it and the fraction of the way
+    /// No errors of the input samples; `positions` are, for each node, the index of the input sample before it and the fraction of the way
     /// to the next one. `rows` are in the order of time.
     ///
     /// # Panics
     /// Unless there is one more place than steps, and at least one step.
-    pub fn new(steps: &[InputStep], places: &[(usize, f64)], rows: &[InputRow]) -> Self {
-        assert_eq!(places.len(), steps.len() + 1, "a place for each node");
+    pub fn new(steps: &[InputStep], positions: &[(usize, f64)], rows: &[InputRow]) -> Self {
+        assert_eq!(positions.len(), steps.len() + 1, "a place for each node");
         let motions = steps[0].state.nrows();
-        let widths = places.windows(2).map(|pair| pair[1].0 - pair[0].0 + 2);
+        let widths = positions.windows(2).map(|pair| pair[1].0 - pair[0].0 + 2);
         let size = motions + widths.max().unwrap_or(2);
-        let each = steps.iter().zip(places.windows(2));
+        let each = steps.iter().zip(positions.windows(2));
         let transitions: Vec<Transition> = each
             .map(|(step, pair)| transition(step, pair[0], pair[1], size))
             .collect();
@@ -89,8 +89,10 @@ impl InputErrors {
             let mut derivatives = transitions[row.step].matrix.rows(0, motions).tr_mul(right);
             let mut here = derivatives.rows_mut(0, motions);
             here += left;
-            let (k, fraction) = row.place;
-            let k = k.saturating_sub(places[row.step].0).min(size - motions - 2);
+            let (k, fraction) = row.position;
+            let k = k
+                .saturating_sub(positions[row.step].0)
+                .min(size - motions - 2);
             derivatives[motions + k] += row.input * (1.0 - fraction);
             derivatives[motions + k + 1] += row.input * fraction;
             Row {
@@ -105,7 +107,7 @@ impl InputErrors {
             gains: vec![(DVector::zeros(size), 1.0); rows.len()],
             rows: rows.collect(),
             transitions,
-            first: places[0].0,
+            first: positions[0].0,
         };
         errors.join(size);
         errors
@@ -356,8 +358,8 @@ mod tests {
                     input: [0, 1].map(|_| DVector::from_fn(motions, |_, _| number())),
                 })
                 .collect();
-            let place = |x: f64| ((spacing * x).floor() as usize, (spacing * x).fract());
-            let places: Vec<(usize, f64)> = (0..nodes).map(|i| place(i as f64)).collect();
+            let position = |x: f64| ((spacing * x).floor() as usize, (spacing * x).fract());
+            let positions: Vec<(usize, f64)> = (0..nodes).map(|i| position(i as f64)).collect();
             let rows: Vec<InputRow> = (0..20)
                 .map(|j| {
                     let step = (j * (nodes - 1)) / 20;
@@ -365,12 +367,12 @@ mod tests {
                         step,
                         states: [0, 1].map(|_| DVector::from_fn(motions, |_, _| number())),
                         input: number(),
-                        place: place(step as f64 + 0.05 * (j % 20) as f64),
+                        position: position(step as f64 + 0.05 * (j % 20) as f64),
                     }
                 })
                 .collect();
-            let errors = InputErrors::new(&steps, &places, &rows).with_ratio(0.7);
-            let inputs = places[nodes - 1].0 + 2;
+            let errors = InputErrors::new(&steps, &positions, &rows).with_ratio(0.7);
+            let inputs = positions[nodes - 1].0 + 2;
             // The definition, without a filter.
             let mut g = DMatrix::zeros(rows.len(), inputs);
             for k in 0..inputs {
@@ -382,15 +384,16 @@ mod tests {
                 let mut states = vec![DVector::zeros(motions)];
                 for (i, step) in steps.iter().enumerate() {
                     let [left, right] = &step.input;
-                    let next =
-                        &step.state * &states[i] + left * at(places[i]) + right * at(places[i + 1]);
+                    let next = &step.state * &states[i]
+                        + left * at(positions[i])
+                        + right * at(positions[i + 1]);
                     states.push(next);
                 }
                 for (j, row) in rows.iter().enumerate() {
                     let [left, right] = &row.states;
                     g[(j, k)] = left.dot(&states[row.step])
                         + right.dot(&states[row.step + 1])
-                        + row.input * at(row.place);
+                        + row.input * at(row.position);
                 }
             }
             let r = DMatrix::identity(20, 20) + 0.49 * &g * g.transpose();

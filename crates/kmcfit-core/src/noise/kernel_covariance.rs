@@ -208,8 +208,8 @@ fn window(length: usize, bandwidth: f64) -> Vec<f64> {
     let weight = |k: usize| {
         let frequency = TAU * k as f64 / length as f64;
         let each = turns.clone().map(|m| {
-            let place = (frequency + TAU * m as f64) / end;
-            (1.0 - place * place).max(0.0)
+            let position = (frequency + TAU * m as f64) / end;
+            (1.0 - position * position).max(0.0)
         });
         let sides = if k == 0 || k == half { 1.0 } else { 2.0 };
         (sides * 1.25 * bandwidth * each.sum::<f64>() / length as f64).sqrt()

@@ -273,8 +273,8 @@ impl RestrictedLikelihood {
         let mut constant = self.constant;
         let channels = self.channels.iter().zip(whitened);
         for ((channel, whitened), noise) in channels.zip(self.split(at)) {
-            let place = noise.correlation_parameters.iter().map(|z| z.to_bits());
-            let whitened = whitened.entry(place.collect());
+            let position = noise.correlation_parameters.iter().map(|z| z.to_bits());
+            let whitened = whitened.entry(position.collect());
             let (own, determinant) =
                 whitened.or_insert_with(|| channel.whitened(&noise.correlation_parameters));
             let (own, determinant) = (&*own, *determinant);
@@ -434,9 +434,9 @@ mod tests {
         let log_sigma = 0.3f64;
         let mut at = vec![log_sigma];
         at.extend(process.coordinates());
-        let place = |i: usize| i + gap * (i / 25);
+        let position = |i: usize| i + gap * (i / 25);
         let matrix = DMatrix::from_fn(n, n, |i, j| {
-            (2.0 * log_sigma).exp() * lags[place(i).abs_diff(place(j))]
+            (2.0 * log_sigma).exp() * lags[position(i).abs_diff(position(j))]
         });
         let inverse = matrix.clone().try_inverse().unwrap();
         let (j, r) = (x.columns(0, 2), x.columns(2, 1));

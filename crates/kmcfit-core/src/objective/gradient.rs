@@ -124,11 +124,11 @@ impl Problem {
     /// If `slopes` has fewer elements than there are samples.
     pub fn predictions_transpose(&self, evaluation: &Evaluation, slopes: &[f64]) -> Vec<f64> {
         let mut first = vec![Vec::new(); self.experiments.len()];
-        let mut place = 0;
+        let mut position = 0;
         for (firsts, experiment) in first.iter_mut().zip(&self.experiments) {
             for channel in &experiment.channels {
-                firsts.push(place..place + channel.len());
-                place += channel.len();
+                firsts.push(position..position + channel.len());
+                position += channel.len();
             }
         }
         self.adjoint_gradient(evaluation, &|e, c| slopes[first[e][c].clone()].to_vec())
@@ -226,10 +226,10 @@ impl Problem {
         let mut sums = vec![0.0; assembly.len()];
         let by_sums = CoefficientGradient::Summed(&mut sums);
         let initial = view.driven().adjoint(view.response, &source, by_sums);
-        for (place, f) in assembly.parts() {
+        for (position, f) in assembly.parts() {
             let first = functions.ranges()[f].start;
             for (j, entry) in functions.get(f).design.row(0) {
-                gradient[first + j] += entry * (direct[place] + sums[place]);
+                gradient[first + j] += entry * (direct[position] + sums[position]);
             }
         }
         add_initial(&experiment.initial_parameters, initial, &mut own);

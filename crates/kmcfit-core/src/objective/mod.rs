@@ -233,9 +233,9 @@ impl Problem {
             0.0f64,
         );
         for (channel, predicted) in self.predicted(evaluation) {
-            for (place, r) in channel.places().zip(channel.residuals(predicted)) {
+            for (position, r) in channel.positions().zip(channel.residuals(predicted)) {
                 if r.abs() > worst.1.abs() {
-                    worst = (place, r);
+                    worst = (position, r);
                 }
             }
         }

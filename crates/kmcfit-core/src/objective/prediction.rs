@@ -15,42 +15,42 @@ const FRACTION: f64 = 1e-4;
 
 impl Channel {
     /// Position of sample `i` on the grid, that of `t_i - delay`; the first or last node where that is before or after the response.
-    pub(crate) fn place(&self, view: SimulatedRecord, i: usize) -> TimePoint {
+    pub(crate) fn position(&self, view: SimulatedRecord, i: usize) -> TimePoint {
         match self.sensor().is_delayed() {
-            false => self.nominal_place(i),
-            true => self.delayed_place(view, i).0,
+            false => self.nominal_position(i),
+            true => self.delayed_position(view, i).0,
         }
     }
 
-    /// [`Channel::place`] of a delayed sample, and true if it lies within the response.
-    fn delayed_place(&self, view: SimulatedRecord, i: usize) -> (TimePoint, bool) {
+    /// [`Channel::position`] of a delayed sample, and true if it lies within the response.
+    fn delayed_position(&self, view: SimulatedRecord, i: usize) -> (TimePoint, bool) {
         let (grid, nodes) = (&view.system.grid, view.response.nodes());
         let end = grid.time(nodes - 1);
         let time = self.times()[i] - self.sensor().total_delay(view.scalars);
         let inside = (grid.start()..=end).contains(&time);
-        let place = TimePoint::of(grid, time.clamp(grid.start(), end));
-        let place = place.unwrap_or(self.nominal_place(i));
-        let place = match place.as_node() {
+        let position = TimePoint::of(grid, time.clamp(grid.start(), end));
+        let position = position.unwrap_or(self.nominal_position(i));
+        let position = match position.as_node() {
             Some(node) => TimePoint::node(node, nodes),
-            None => place,
+            None => position,
         };
-        (place, inside)
+        (position, inside)
     }
 
     /// Observation at sample `i` with its derivatives, before gain, offset and drift.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
-        self.sensed_at(view, i, self.place(view, i))
+        self.sensed_at(view, i, self.position(view, i))
     }
 
-    fn sensed_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> Observation {
-        let (input, base) = self.inputs_at(view, i, place);
+    fn sensed_at(&self, view: SimulatedRecord, i: usize, position: TimePoint) -> Observation {
+        let (input, base) = self.inputs_at(view, i, position);
         let mut sensed = observe(
             view.system,
             self.kind(),
             view.nodal,
             view.excitation,
             view.response,
-            place,
+            position,
             input,
         );
         sensed.value += base;
@@ -58,25 +58,30 @@ impl Channel {
     }
 
     /// Value of [`Channel::sensed_at`].
-    fn value_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> f64 {
-        let (input, base) = self.inputs_at(view, i, place);
+    fn value_at(&self, view: SimulatedRecord, i: usize, position: TimePoint) -> f64 {
+        let (input, base) = self.inputs_at(view, i, position);
         base + observe_value(
             view.system,
             self.kind(),
             view.nodal,
             view.excitation,
             view.response,
-            place,
+            position,
             input,
         )
     }
 
     /// Input at sample `i`, and the motion of the base in its value.
-    fn inputs_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> (InputSample, f64) {
+    fn inputs_at(
+        &self,
+        view: SimulatedRecord,
+        i: usize,
+        position: TimePoint,
+    ) -> (InputSample, f64) {
         let is_delayed = self.sensor().is_delayed();
         let input = match (is_delayed, view.excitation) {
             (false, excitation) => self.input_at_sample(excitation, i),
-            (true, Some(excitation)) => excitation.input_at(place),
+            (true, Some(excitation)) => excitation.input_at(position),
             (true, None) => InputSample::default(),
         };
         let moves = is_delayed && self.kind() == ChannelKind::Acceleration;
@@ -98,13 +103,16 @@ impl Channel {
         i: usize,
         mut value_at: impl FnMut(TimePoint) -> f64,
     ) -> f64 {
-        let (place, inside) = self.delayed_place(view, i);
+        let (position, inside) = self.delayed_position(view, i);
         if !inside {
             return 0.0;
         }
         let mut at = |by: f64| {
-            let fraction = place.fraction + by;
-            value_at(TimePoint { fraction, ..place })
+            let fraction = position.fraction + by;
+            value_at(TimePoint {
+                fraction,
+                ..position
+            })
         };
         (at(FRACTION) - at(-FRACTION)) / (2.0 * FRACTION * view.system.grid.step())
     }
@@ -117,7 +125,7 @@ impl Channel {
         i: usize,
         value: f64,
     ) -> [f64; Sensor::PARAMETERS] {
-        self.factors(view, i, value, |place| self.value_at(view, i, place))
+        self.factors(view, i, value, |position| self.value_at(view, i, position))
     }
 
     /// [`Channel::sensor_factors`] with the value of sample `i` at any place.
@@ -141,11 +149,11 @@ impl Channel {
     pub(crate) fn observed_value(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
-            self.place(view, i).as_node(),
+            self.position(view, i).as_node(),
             self.base().is_empty(),
         ) {
             (ChannelKind::Displacement, Some(node), true) => view.response.displacement(0)[node],
-            _ => self.value_at(view, i, self.place(view, i)),
+            _ => self.value_at(view, i, self.position(view, i)),
         }
     }
 
@@ -197,7 +205,7 @@ impl Channel {
         let [gain, ..] = self.sensor().values(view.scalars);
         let model = |i: usize| {
             let sensed = self.sensed(view, i);
-            let TimePoint { step, .. } = self.place(view, i);
+            let TimePoint { step, .. } = self.position(view, i);
             let factors = self.sensor_factors(view, i, sensed.value);
             gain * answer(&sensed, step, along) + self.sensor().change(factors, along.scalars)
         };
@@ -247,13 +255,13 @@ impl Channel {
         let [gain, ..] = self.sensor().values(view.scalars);
         let simple = self.kind() == ChannelKind::Displacement && !self.sensor().is_estimated();
         for (i, slope) in slopes.iter().enumerate() {
-            let place = self.place(view, i);
-            if let (true, Some(node)) = (simple, place.as_node()) {
+            let position = self.position(view, i);
+            if let (true, Some(node)) = (simple, position.as_node()) {
                 source.component_mut(0)[node] += gain * slope;
                 continue;
             }
             let sensed = self.sensed(view, i);
-            spread(&sensed, place.step, gain * slope, source, direct);
+            spread(&sensed, position.step, gain * slope, source, direct);
             let factors = self.sensor_factors(view, i, sensed.value);
             self.sensor().add_gradient(factors, *slope, scalars);
         }

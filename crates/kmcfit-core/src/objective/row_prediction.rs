@@ -23,41 +23,41 @@ impl<'a> RowSamples<'a> {
         }
     }
 
-    /// Motion of the base that a sensor of absolute motion adds to sample `i`, at `place`.
-    fn base(&self, i: usize, place: TimePoint) -> f64 {
+    /// Motion of the base that a sensor of absolute motion adds to sample `i`, at `position`.
+    fn base(&self, i: usize, position: TimePoint) -> f64 {
         let channel = self.channel;
         let is_moved = channel.sensor().is_delayed() && channel.kind() == ChannelKind::Acceleration;
         match (channel.base().get(i), self.view.excitation) {
             (Some(_), Some(excitation)) if is_moved => {
                 let entries = channel.row().entries().iter();
                 let of =
-                    |(j, factor): &(usize, f64)| Some(factor * excitation.frame(*j)?.at(place));
+                    |(j, factor): &(usize, f64)| Some(factor * excitation.frame(*j)?.at(position));
                 entries.filter_map(of).sum()
             }
             (base, _) => base.copied().unwrap_or(0.0),
         }
     }
 
-    fn value_at(&mut self, i: usize, place: TimePoint) -> f64 {
+    fn value_at(&mut self, i: usize, position: TimePoint) -> f64 {
         let channel = self.channel;
-        self.base(i, place) + self.observer.value(channel.kind(), channel.row(), place)
+        self.base(i, position) + self.observer.value(channel.kind(), channel.row(), position)
     }
 
     /// Value at sample `i`, before gain, offset and drift.
     pub fn value(&mut self, i: usize) -> f64 {
-        self.value_at(i, self.channel.place(self.view, i))
+        self.value_at(i, self.channel.position(self.view, i))
     }
 
     /// [`RowSamples::value`] with its derivatives; the value is without the motion of the base.
     pub fn observe(&mut self, i: usize) -> &RowObservation {
-        let place = self.channel.place(self.view, i);
-        (self.observer).observe(self.channel.kind(), self.channel.row(), place)
+        let position = self.channel.position(self.view, i);
+        (self.observer).observe(self.channel.kind(), self.channel.row(), position)
     }
 
     /// Derivative of sample `i`, an acceleration, by an input at its time that acts on some coordinates.
     pub fn by_input(&mut self, i: usize, quantity: InputQuantity, acting: &[usize]) -> f64 {
-        let (channel, place) = (self.channel, self.channel.place(self.view, i));
-        let [forces, frames] = (self.observer).acceleration_by_inputs(channel.row(), place);
+        let (channel, position) = (self.channel, self.channel.position(self.view, i));
+        let [forces, frames] = (self.observer).acceleration_by_inputs(channel.row(), position);
         let is_absolute = !channel.base().is_empty();
         let of_frame = |j: &usize| {
             let entries = channel.row().entries().iter();
@@ -77,7 +77,7 @@ impl<'a> RowSamples<'a> {
     pub fn sensor_factors(&mut self, i: usize) -> [f64; Sensor::PARAMETERS] {
         let (channel, view) = (self.channel, self.view);
         let value = self.value(i);
-        channel.factors(view, i, value, |place| self.value_at(i, place))
+        channel.factors(view, i, value, |position| self.value_at(i, position))
     }
 
     pub fn predict_into(&mut self, out: &mut Vec<f64>) {
@@ -93,7 +93,7 @@ impl<'a> RowSamples<'a> {
         let [gain, ..] = channel.sensor().values(scalars);
         let mut out = vec![Vec::with_capacity(channel.len()); along.len()];
         for i in 0..channel.len() {
-            let TimePoint { step, .. } = channel.place(self.view, i);
+            let TimePoint { step, .. } = channel.position(self.view, i);
             let factors = channel
                 .sensor()
                 .is_estimated()
@@ -118,7 +118,7 @@ impl<'a> RowSamples<'a> {
         let channel = self.channel;
         let [gain, ..] = channel.sensor().values(self.view.scalars);
         for (i, slope) in slopes.iter().enumerate() {
-            let TimePoint { step, .. } = channel.place(self.view, i);
+            let TimePoint { step, .. } = channel.position(self.view, i);
             if channel.sensor().is_estimated() {
                 let factors = self.sensor_factors(i);
                 channel.sensor().add_gradient(factors, *slope, scalars);

@@ -58,8 +58,8 @@ impl Problem {
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
             }
-            for &(place, f) in assembly.known_parts() {
-                sizes[f] = sizes[f].max(sizes[assembly[place]]);
+            for &(position, f) in assembly.known_parts() {
+                sizes[f] = sizes[f].max(sizes[assembly[position]]);
             }
         }
         sizes

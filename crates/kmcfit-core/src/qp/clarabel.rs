@@ -125,12 +125,12 @@ impl Subproblem {
             .chain(ones)
             .chain(zeros)
             .collect();
-        let places: Vec<usize> = (0..diagonal.len()).collect();
+        let positions: Vec<usize> = (0..diagonal.len()).collect();
         CscMatrix::new_from_triplets(
             diagonal.len(),
             diagonal.len(),
-            places.clone(),
-            places,
+            positions.clone(),
+            positions,
             diagonal,
         )
     }

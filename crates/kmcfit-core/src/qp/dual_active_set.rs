@@ -48,7 +48,7 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// `y + a x` in place of `y`.
+/// `y + a x` in position of `y`.
 fn add_multiple(a: f64, x: &[f64], y: &mut [f64]) {
     y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x);
 }
@@ -99,10 +99,10 @@ impl ActiveRows {
         true
     }
 
-    fn remove(&mut self, place: usize) {
-        let later: Vec<ActiveRow> = self.rows.drain(place..).skip(1).collect();
-        self.basis.truncate(place);
-        self.triangle.0.truncate(place);
+    fn remove(&mut self, position: usize) {
+        let later: Vec<ActiveRow> = self.rows.drain(position..).skip(1).collect();
+        self.basis.truncate(position);
+        self.triangle.0.truncate(position);
         // Fewer rows are less dependent.
         later.into_iter().for_each(|row| {
             self.push(row);
@@ -115,8 +115,8 @@ struct LeastDistance<'a> {
     sub: &'a Subproblem,
     reduced: Reduced,
     triangle: UpperTriangle,
-    /// Place of each variable among the free ones.
-    places: Vec<Option<usize>>,
+    /// VariableRole of each variable among the free ones.
+    positions: Vec<Option<usize>>,
 }
 
 impl Subproblem {
@@ -134,15 +134,15 @@ impl Subproblem {
         for (i, (entries, _)) in reduced.triangle.rows().enumerate() {
             entries.for_each(|(j, r)| triangle.0[j][i] = r);
         }
-        let mut places = vec![None; self.variables];
-        for (place, j) in reduced.free.iter().enumerate() {
-            places[*j] = Some(place);
+        let mut positions = vec![None; self.variables];
+        for (position, j) in reduced.free.iter().enumerate() {
+            positions[*j] = Some(position);
         }
         let program = LeastDistance {
             sub: self,
             reduced,
             triangle,
-            places,
+            positions,
         };
         program.minimise(&unbounded)
     }
@@ -175,7 +175,7 @@ impl LeastDistance<'_> {
                 let ratios = active.rows.iter().zip(&fall).enumerate();
                 let blocking = ratios
                     .filter(|(_, (_, fall))| **fall > 0.0)
-                    .map(|(place, (row, fall))| (place, row.multiplier / fall))
+                    .map(|(position, (row, fall))| (position, row.multiplier / fall))
                     .min_by(|(_, a), (_, b)| a.total_cmp(b));
                 let step = blocking.map_or(full, |(_, most)| most.min(full));
                 // No step reaches the row: no point is feasible.
@@ -189,7 +189,7 @@ impl LeastDistance<'_> {
                     z = self.variables(unbounded, &w);
                 }
                 match blocking {
-                    Some((place, most)) if most < full => active.remove(place),
+                    Some((position, most)) if most < full => active.remove(position),
                     _ => {
                         active.push(entering).then_some(())?;
                         break;
@@ -257,8 +257,8 @@ impl LeastDistance<'_> {
     fn normal(&self, row: usize, sign: f64) -> Vec<f64> {
         let mut g = vec![0.0; self.reduced.free.len()];
         for (j, a) in self.sub.inequalities.row(row) {
-            if let Some(place) = self.places[j] {
-                g[place] -= sign * a;
+            if let Some(position) = self.positions[j] {
+                g[position] -= sign * a;
             }
         }
         self.triangle.solve_transposed(&g)

@@ -57,9 +57,9 @@ impl Reduced {
 
 /// The rows of the residuals and of the proximal terms in the `free` variables, with the others at `z`.
 fn triangle(sub: &Subproblem, target: &[f64], z: &[f64], free: &[usize]) -> Triangle {
-    let mut places = vec![None; sub.variables];
-    for (place, j) in free.iter().enumerate() {
-        places[*j] = Some(place);
+    let mut positions = vec![None; sub.variables];
+    for (position, j) in free.iter().enumerate() {
+        positions[*j] = Some(position);
     }
 
     // Largest rows first, which preserves the digits of much smaller ones.
@@ -92,8 +92,8 @@ fn triangle(sub: &Subproblem, target: &[f64], z: &[f64], free: &[usize]) -> Tria
             }
             right[r] = target[i];
             for (j, a) in sub.residuals.row(i) {
-                match places[j] {
-                    Some(place) => block.column_mut(place)[r] = a,
+                match positions[j] {
+                    Some(position) => block.column_mut(position)[r] = a,
                     None => right[r] -= a * z[j],
                 }
             }

@@ -38,7 +38,7 @@ impl ResponseVariables {
 
 /// Role and node of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum VariableRole {
     /// History `f` at a node.
     History(usize, usize),
     /// Component of the responses, one response after the other, at a node.
@@ -47,7 +47,7 @@ pub(super) enum Place {
     Constant(usize),
 }
 
-impl Place {
+impl VariableRole {
     /// The first node at which the variable acts.
     pub fn node(self) -> usize {
         match self {
@@ -84,18 +84,18 @@ impl StageLayout {
     }
 
     /// The place of every variable; `None` unless each of the `variables` has exactly one.
-    pub(super) fn places(&self, variables: usize) -> Option<Vec<Place>> {
-        let mut places = vec![None; variables];
-        let mut put = |variable: usize, place: Place| {
-            let slot = places.get_mut(variable)?;
-            slot.is_none().then(|| *slot = Some(place))
+    pub(super) fn positions(&self, variables: usize) -> Option<Vec<VariableRole>> {
+        let mut positions = vec![None; variables];
+        let mut put = |variable: usize, position: VariableRole| {
+            let slot = positions.get_mut(variable)?;
+            slot.is_none().then(|| *slot = Some(position))
         };
         for (f, history) in self.histories.iter().enumerate() {
             if history.len() != self.nodes {
                 return None;
             }
             for (node, variable) in history.clone().enumerate() {
-                put(variable, Place::History(f, node))?;
+                put(variable, VariableRole::History(f, node))?;
             }
         }
         let mut base = 0;
@@ -106,18 +106,18 @@ impl StageLayout {
             let components = response.components();
             for (q, initial) in response.initial.iter().enumerate() {
                 if let Some(variable) = initial {
-                    put(*variable, Place::Response(base + q, 0))?;
+                    put(*variable, VariableRole::Response(base + q, 0))?;
                 }
                 for node in 1..response.nodes {
                     let variable = response.first + components * (node - 1) + q;
-                    put(variable, Place::Response(base + q, node))?;
+                    put(variable, VariableRole::Response(base + q, node))?;
                 }
             }
             base += components;
         }
         for (c, variable) in self.constants.iter().enumerate() {
-            put(*variable, Place::Constant(c))?;
+            put(*variable, VariableRole::Constant(c))?;
         }
-        places.into_iter().collect()
+        positions.into_iter().collect()
     }
 }

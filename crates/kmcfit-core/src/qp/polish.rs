@@ -68,7 +68,7 @@ impl Subproblem {
     /// minimum, and no interior-point method is needed. `None` if a few corrections do not find it.
     pub(super) fn minimum_from_zero(&self) -> Option<(PrimalDual, Kkt)> {
         let is_small = self.elimination_order.len() == self.variables
-            && self.elimination_order.iter().all(|place| *place == 0);
+            && self.elimination_order.iter().all(|position| *position == 0);
         (is_small && self.can_be_polished()).then_some(())?;
         let zero = PrimalDual::zero(self);
         let kkt = self.kkt(&zero);

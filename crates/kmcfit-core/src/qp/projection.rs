@@ -5,7 +5,7 @@ use crate::constraints::{Cone, Constraints, RowGroup, Rows};
 
 /// Row of a subproblem that represents a row of a group, for the assignment of its multiplier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RowPlace {
+pub enum RowPosition {
     /// Index of an equality.
     Equality(usize),
     /// Index of an inequality.
@@ -15,8 +15,8 @@ pub enum RowPlace {
 impl Subproblem {
     /// Adds `constraints` for the step from `theta`; the first variables of the subproblem are the changes of the parameters. Returns the place of
     /// each group's rows.
-    pub fn constrain(&mut self, constraints: &Constraints, theta: &[f64]) -> Vec<Vec<RowPlace>> {
-        let places = (constraints.groups.iter())
+    pub fn constrain(&mut self, constraints: &Constraints, theta: &[f64]) -> Vec<Vec<RowPosition>> {
+        let positions = (constraints.groups.iter())
             .map(|group| self.constrain_group(group, theta))
             .collect();
         for cone in constraints.cones.iter().flat_map(|group| &group.cones) {
@@ -27,19 +27,19 @@ impl Subproblem {
             }
             self.cones.push(Cone { rows });
         }
-        places
+        positions
     }
 
-    fn constrain_group(&mut self, group: &RowGroup, theta: &[f64]) -> Vec<RowPlace> {
+    fn constrain_group(&mut self, group: &RowGroup, theta: &[f64]) -> Vec<RowPosition> {
         let values = group.rows.multiply(theta);
         let rows = values.iter().enumerate().map(|(i, value)| {
             let [lower, upper] = group.bounds(i);
             if lower == upper {
                 self.equalities.push(group.rows.row(i), lower - value);
-                RowPlace::Equality(self.equalities.len() - 1)
+                RowPosition::Equality(self.equalities.len() - 1)
             } else {
                 self.bound(group.rows.row(i), lower - value, upper - value);
-                RowPlace::Inequality(self.inequalities.len() - 1)
+                RowPosition::Inequality(self.inequalities.len() - 1)
             }
         });
         rows.collect()
@@ -48,13 +48,13 @@ impl Subproblem {
 
 impl Solution {
     /// Multipliers by group and row.
-    pub fn by_group(&self, places: &[Vec<RowPlace>]) -> Vec<Vec<f64>> {
-        let multiplier = |place: &RowPlace| match *place {
-            RowPlace::Equality(i) => self.equality_multipliers[i],
-            RowPlace::Inequality(i) => self.multipliers[i],
+    pub fn by_group(&self, positions: &[Vec<RowPosition>]) -> Vec<Vec<f64>> {
+        let multiplier = |position: &RowPosition| match *position {
+            RowPosition::Equality(i) => self.equality_multipliers[i],
+            RowPosition::Inequality(i) => self.multipliers[i],
         };
-        let group = |rows: &Vec<RowPlace>| rows.iter().map(multiplier).collect();
-        places.iter().map(group).collect()
+        let group = |rows: &Vec<RowPosition>| rows.iter().map(multiplier).collect();
+        positions.iter().map(group).collect()
     }
 }
 
@@ -86,11 +86,11 @@ pub fn project_by(
     let mut sub = Subproblem::new(theta.len());
     sub.layout = layout;
     sub.proximal.copy_from_slice(metric);
-    let places = sub.constrain(constraints, theta);
+    let positions = sub.constrain(constraints, theta);
     let solution = solve(&sub);
     Projection {
         status: solution.status,
         theta: constraints.moved(theta, &solution.z),
-        multipliers: solution.by_group(&places),
+        multipliers: solution.by_group(&positions),
     }
 }

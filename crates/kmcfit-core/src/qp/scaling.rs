@@ -47,8 +47,8 @@ impl ScaledProgram {
             |cone: &Cone| (0..cone.rows.len()).fold(0.0f64, |m, i| m.max(cone.rows.scale(i)));
         let cones: Vec<f64> = scaled.cones.iter().map(|c| row_factor(scale(c))).collect();
         let mut sub = Subproblem::new(scaled.variables);
-        let roots = vec![root; scaled.residuals.len()];
-        sub.residuals = times(&scaled.residuals, &roots);
+        let weight_roots = vec![root; scaled.residuals.len()];
+        sub.residuals = times(&scaled.residuals, &weight_roots);
         sub.proximal = scaled.proximal.iter().map(|d| d * cost).collect();
         sub.equalities = times(&scaled.equalities, &equalities);
         sub.inequalities = times(&scaled.inequalities, &inequalities);

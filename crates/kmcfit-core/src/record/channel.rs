@@ -1,6 +1,6 @@
 //! One channel of a record: the samples of one sensor.
 
-use super::sample_places::SamplePlaces;
+use super::sample_positions::SamplePositions;
 use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::structure::{Ends, Structure};
@@ -22,7 +22,7 @@ pub struct Channel {
     times: Arc<Vec<f64>>,
     /// Time from which a drift counts, s.
     origin: f64,
-    places: SamplePlaces,
+    positions: SamplePositions,
     observed: Arc<Vec<f64>>,
     /// Samples before the filter; empty without a filter.
     unfiltered: Arc<Vec<f64>>,
@@ -65,11 +65,11 @@ impl Channel {
         nodes: usize,
     ) -> Option<Self> {
         let fits = times.len() == values.len() && !values.is_empty();
-        let places = SamplePlaces::of(&times, grid, nodes)?;
+        let positions = SamplePositions::of(&times, grid, nodes)?;
         fits.then(|| Self {
             kind,
             row: Ends::ground(0),
-            places,
+            positions,
             origin: times[0],
             times,
             observed: values,
@@ -291,7 +291,7 @@ impl Channel {
             row: self.row.clone(),
             times: Arc::new(short(&self.times)),
             origin: self.origin,
-            places: self.places.first(count),
+            positions: self.positions.first(count),
             observed: Arc::new(short(&self.observed)),
             unfiltered: Arc::new(short(&self.unfiltered)),
             weighting,
@@ -315,20 +315,20 @@ impl Channel {
 
     /// Number of samples of [`Channel::within`].
     pub(crate) fn count_within(&self, steps: usize) -> usize {
-        self.places.count_within(steps)
+        self.positions.count_within(steps)
     }
 
     /// The samples `samples` before the filter, for a response over the first `nodes` nodes of another grid; `None` if one does not lie
     /// on it.
     pub(crate) fn part(&self, samples: Range<usize>, grid: &Grid, nodes: usize) -> Option<Self> {
-        let places = SamplePlaces::of(&self.times[samples.clone()], grid, nodes)?;
+        let positions = SamplePositions::of(&self.times[samples.clone()], grid, nodes)?;
         let cut = |list: &Arc<Vec<f64>>| match list.len() == samples.len() || list.is_empty() {
             true => Arc::clone(list),
             false => Arc::new(list[samples.clone()].to_vec()),
         };
         let inputs = self.inputs_at_samples.as_ref();
         Some(Self {
-            places,
+            positions,
             times: cut(&self.times),
             observed: cut(&self.observed),
             base: cut(&self.base),
@@ -350,14 +350,14 @@ impl Channel {
     }
 
     /// Positions of the times of the samples on the grid, without a delay.
-    pub fn places(&self) -> impl ExactSizeIterator<Item = TimePoint> + Clone + '_ {
-        self.places.iter()
+    pub fn positions(&self) -> impl ExactSizeIterator<Item = TimePoint> + Clone + '_ {
+        self.positions.iter()
     }
 
     /// Position of the time of sample `i` on the grid, without a delay.
     #[inline(always)]
-    pub fn nominal_place(&self, i: usize) -> TimePoint {
-        self.places.get(i)
+    pub fn nominal_position(&self, i: usize) -> TimePoint {
+        self.positions.get(i)
     }
 
     /// Samples, filtered if the channel has a filter, in the SI unit of the kind.
@@ -402,7 +402,7 @@ impl Channel {
                 force: inputs[0].get(i).copied().unwrap_or(0.0),
                 base: inputs[1].get(i).copied().unwrap_or(0.0),
             },
-            (None, Some(excitation)) => excitation.input_at(self.places.get(i)),
+            (None, Some(excitation)) => excitation.input_at(self.positions.get(i)),
             (None, None) => InputSample::default(),
         }
     }
@@ -446,15 +446,15 @@ impl Channel {
 
     /// True if all samples are displacements at nodes.
     pub(crate) fn is_displacement_at_nodes(&self) -> bool {
-        let all = || self.places.iter().all(|p| p.as_node().is_some());
+        let all = || self.positions.iter().all(|p| p.as_node().is_some());
         self.kind == ChannelKind::Displacement
             && !self.sensor.is_delayed()
-            && (self.places.are_nodes() || all())
+            && (self.positions.are_nodes() || all())
     }
 
     /// True if sample `i` lies on node `i`.
     pub(crate) fn is_on_every_node(&self) -> bool {
-        self.places.are_nodes() && !self.sensor.is_delayed()
+        self.positions.are_nodes() && !self.sensor.is_delayed()
     }
 
     /// Forces (N) and base accelerations (m/s^2) at the samples, if given; empty if zero.
@@ -470,17 +470,17 @@ impl Channel {
 
     /// Number of nodes between samples, for unfiltered displacements of an ideal sensor at the nodes `0, stride, 2 stride, ...`.
     pub fn stride(&self) -> Option<usize> {
-        if self.is_plain() && self.places.are_nodes() {
+        if self.is_plain() && self.positions.are_nodes() {
             return Some(1);
         }
-        if !self.is_plain() || self.places.get(0).as_node() != Some(0) {
+        if !self.is_plain() || self.positions.get(0).as_node() != Some(0) {
             return None;
         }
         let stride = match self.len() {
             1 => 1,
-            _ => self.places.get(1).as_node()?,
+            _ => self.positions.get(1).as_node()?,
         };
-        let in_place = |(i, place): (usize, TimePoint)| place.as_node() == Some(i * stride);
-        (self.places.iter().enumerate().all(in_place)).then_some(stride)
+        let in_place = |(i, position): (usize, TimePoint)| position.as_node() == Some(i * stride);
+        (self.positions.iter().enumerate().all(in_place)).then_some(stride)
     }
 }

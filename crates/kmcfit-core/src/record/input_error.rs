@@ -32,13 +32,13 @@ pub struct InputNoise {
 impl InputNoise {
     /// For each of the first `nodes` nodes of `grid` the index of the input sample before it, at most the last but one, and the
     /// fraction of the way to the next sample, from 0 to 1.
-    pub fn places(&self, grid: &Grid, nodes: usize) -> Vec<(usize, f64)> {
-        let place = |i: usize| self.place(grid.time(i));
-        (0..nodes).map(place).collect()
+    pub fn positions(&self, grid: &Grid, nodes: usize) -> Vec<(usize, f64)> {
+        let position = |i: usize| self.position(grid.time(i));
+        (0..nodes).map(position).collect()
     }
 
     /// Index of the input sample before time `t` (s), at most the last but one, and the fraction of the way to the next one.
-    pub fn place(&self, t: f64) -> (usize, f64) {
+    pub fn position(&self, t: f64) -> (usize, f64) {
         let later = self.times.partition_point(|time| *time <= t);
         let before = later.saturating_sub(1).min(self.times.len() - 2);
         let [left, right] = [self.times[before], self.times[before + 1]];
@@ -47,7 +47,7 @@ impl InputNoise {
 
     /// Value at time `t` (s) of the errors `values` of the samples.
     pub fn at(&self, values: &[f64], t: f64) -> f64 {
-        let (before, fraction) = self.place(t);
+        let (before, fraction) = self.position(t);
         values[before] * (1.0 - fraction) + values[before + 1] * fraction
     }
 }
@@ -66,7 +66,7 @@ mod tests {
             interpolation: Interpolation::Linear,
         };
         let grid = Grid::new(-0.5, 4.0, 9).unwrap();
-        let places = error.places(&grid, 9);
+        let positions = error.positions(&grid, 9);
         let expected = [
             (0, 0.0),
             (0, 0.0),
@@ -78,7 +78,7 @@ mod tests {
             (1, 1.0),
             (1, 1.0),
         ];
-        assert_eq!(places, expected);
+        assert_eq!(positions, expected);
         let values = [4.0, 2.0, 6.0];
         assert_eq!(
             [0.5, 2.0, 9.0].map(|t| error.at(&values, t)),

@@ -19,7 +19,7 @@ pub struct Measurements {
 /// State of an experiment at some times, with force and base acceleration.
 #[derive(Debug)]
 pub struct Measured {
-    pub places: Vec<TimePoint>,
+    pub positions: Vec<TimePoint>,
     /// Index of the first time among the samples, if the times are those of one channel.
     pub first: usize,
     /// Displacement, m.

@@ -9,7 +9,7 @@ mod loss;
 mod measured;
 mod misfit;
 mod noise;
-mod sample_places;
+mod sample_positions;
 mod sensor;
 mod weighting;
 mod whitening;

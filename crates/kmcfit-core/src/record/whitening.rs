@@ -7,7 +7,7 @@ use crate::noise::Correlation;
 /// ([`Channel::whiten_rows`]) where the noise is correlated.
 pub struct Majorant {
     /// Roots of the weights.
-    pub roots: Vec<f64>,
+    pub weight_roots: Vec<f64>,
     /// `root_i e_i`.
     pub weighted: Vec<f64>,
 }
@@ -82,7 +82,7 @@ impl Channel {
         }
     }
 
-    /// Changes `rows` of predictions, one per sample, to rows of the quadratic majorant up to its roots: `W (rows/sigma)` for
+    /// Changes `rows` of predictions, one per sample, to rows of the quadratic majorant up to its weight_roots: `W (rows/sigma)` for
     /// correlated noise, unchanged otherwise.
     pub fn whiten_rows(&self, rows: &mut [f64]) {
         if let Some(correlation) = self.correlation() {
@@ -94,7 +94,7 @@ impl Channel {
 
     /// Quadratic majorant of the misfit at predictions.
     pub fn majorant(&self, predicted: &[f64]) -> Majorant {
-        let (mut weighted, roots): (Vec<f64>, Vec<f64>) = match self.correlation() {
+        let (mut weighted, weight_roots): (Vec<f64>, Vec<f64>) = match self.correlation() {
             None => {
                 let each = self.residuals(predicted).enumerate();
                 each.map(|(i, r)| (r, self.weight(i, r).sqrt())).unzip()
@@ -104,9 +104,12 @@ impl Channel {
                 each.map(|e| (e, self.loss().weight(e).sqrt())).unzip()
             }
         };
-        let pairs = weighted.iter_mut().zip(&roots);
+        let pairs = weighted.iter_mut().zip(&weight_roots);
         pairs.for_each(|(r, root)| *r *= root);
-        Majorant { weighted, roots }
+        Majorant {
+            weighted,
+            weight_roots,
+        }
     }
 
     /// Factor of the standard errors' inverse by the loss, beside the roots of [`Channel::majorant`]; 1 for least squares.
@@ -231,7 +234,10 @@ mod tests {
                 let mut unit = vec![0.0; 31];
                 unit[j] = 1.0;
                 channel.whiten_rows(&mut unit);
-                let rows = unit.iter().zip(&majorant.roots).zip(&majorant.weighted);
+                let rows = unit
+                    .iter()
+                    .zip(&majorant.weight_roots)
+                    .zip(&majorant.weighted);
                 let by_rows: f64 = rows.map(|((u, root), r)| 2.0 * u * root * r).sum();
                 assert!((by_rows - slopes[j]).abs() < 1e-10 * slopes[j].abs().max(1.0));
             }

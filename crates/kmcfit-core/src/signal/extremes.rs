@@ -61,10 +61,10 @@ mod tests {
     #[test]
     fn extremes_are_those_of_every_value() {
         for count in 0..20 {
-            for place in 0..count.max(1) {
+            for position in 0..count.max(1) {
                 for odd in [-9.0, 9.0, f64::NAN, f64::INFINITY, -20.0, 20.0] {
                     let mut values: Vec<f64> = (0..count).map(|i| f64::from(i * 7 % 5)).collect();
-                    if let Some(value) = values.get_mut(place as usize) {
+                    if let Some(value) = values.get_mut(position as usize) {
                         *value = odd;
                     }
                     let found = Extremes::of(&values, -10.0..=10.0);

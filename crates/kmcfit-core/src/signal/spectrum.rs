@@ -136,8 +136,8 @@ impl Spectrum {
         let mut left = q.clamp(0.0, 1.0) * self.density.iter().sum::<f64>();
         for (k, density) in self.density.iter().enumerate() {
             if left <= *density && *density > 0.0 {
-                let place = (k as f64 - 0.5 + left / density).clamp(0.0, last as f64);
-                return place * self.resolution;
+                let position = (k as f64 - 0.5 + left / density).clamp(0.0, last as f64);
+                return position * self.resolution;
             }
             left -= density;
         }

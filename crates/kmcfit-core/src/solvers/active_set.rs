@@ -165,10 +165,10 @@ fn multipliers(problem: &Problem, point: &Iterate) -> Option<Multipliers> {
         let root = m.sqrt();
         sub.residuals.push([(j, root)], -g / (root * scale));
     }
-    let places = sub.constrain(&problem.constraints, &point.parameters);
+    let positions = sub.constrain(&problem.constraints, &point.parameters);
     let solution = sub.solve();
     solution.status.is_point().then(|| {
-        let mut rows = solution.by_group(&places);
+        let mut rows = solution.by_group(&positions);
         rows.iter_mut().flatten().for_each(|m| *m *= scale);
         let mut each = solution.cone_multipliers.iter().map(|m| m * scale);
         let groups = problem.constraints.cones.iter();

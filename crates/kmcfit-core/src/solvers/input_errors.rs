@@ -158,7 +158,7 @@ pub(crate) fn input_error_effect(
         .map_or(vec![0], |e| e.acting(error.quantity));
     let rows: Vec<InputRow> = (0..count)
         .map(|j| {
-            let place = channel.place(view, j);
+            let position = channel.position(view, j);
             let by_input = match is_acceleration {
                 true => of_rows.by_input(j, error.quantity, &acting),
                 false => 0.0,
@@ -166,10 +166,11 @@ pub(crate) fn input_error_effect(
             let states = of_rows.observe(j).states.each_ref();
             let states = states.map(|by| gain * DVector::from_column_slice(by));
             InputRow {
-                step: place.step,
+                step: position.step,
                 states,
                 input: gain * by_input,
-                place: error.place(grid.time(place.step) + place.fraction * grid.step()),
+                position: error
+                    .position(grid.time(position.step) + position.fraction * grid.step()),
             }
         })
         .collect();
@@ -177,8 +178,8 @@ pub(crate) fn input_error_effect(
     let steps = derivatives.into_iter().take(reached);
     let steps = steps.map(|(state, input)| InputStep { state, input });
     let steps: Vec<InputStep> = steps.collect();
-    let places = error.places(grid, steps.len() + 1);
-    InputErrors::new(&steps, &places, &rows)
+    let positions = error.positions(grid, steps.len() + 1);
+    InputErrors::new(&steps, &positions, &rows)
 }
 
 /// The channel with an estimated sigma at which `r^T C^-1 r` is the number of samples less the share of the parameters; a stated

@@ -168,7 +168,12 @@ fn residual_rows(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
                 channel.whiten_rows(column.as_mut_slice());
             }
             let majorant = channel.majorant(predicted);
-            for (i, (root, r)) in majorant.roots.iter().zip(&majorant.weighted).enumerate() {
+            for (i, (root, r)) in majorant
+                .weight_roots
+                .iter()
+                .zip(&majorant.weighted)
+                .enumerate()
+            {
                 own.row_mut(i).scale_mut(*root);
                 own[(i, n)] = *r;
             }

@@ -11,9 +11,9 @@ pub(super) fn discrepancy(problem: &Problem, points: &[PathPoint]) -> Option<usi
 
 /// Point of largest curvature of (log misfit, log roughness) along the path.
 pub(super) fn l_curve(points: &[PathPoint]) -> Option<usize> {
-    let place = |p: &PathPoint| (p.misfit.ln(), p.roughness.ln());
+    let position = |p: &PathPoint| (p.misfit.ln(), p.roughness.ln());
     let curvature = |w: &[PathPoint]| {
-        let [(x0, y0), (x1, y1), (x2, y2)] = [place(&w[0]), place(&w[1]), place(&w[2])];
+        let [(x0, y0), (x1, y1), (x2, y2)] = [position(&w[0]), position(&w[1]), position(&w[2])];
         // Menger curvature, signed by the turn; the corner turns right as the weight falls.
         let cross = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
         let side = |ax: f64, ay: f64, bx: f64, by: f64| (ax - bx).hypot(ay - by);
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     /// Points of a path with these natural logarithms of misfit and roughness.
-    fn path(places: impl IntoIterator<Item = [f64; 2]>) -> Vec<PathPoint> {
+    fn path(positions: impl IntoIterator<Item = [f64; 2]>) -> Vec<PathPoint> {
         let point = |[misfit, roughness]: [f64; 2]| PathPoint {
             weight: 1.0,
             iterations: 1,
@@ -78,20 +78,20 @@ mod tests {
             bic: None,
             parameters: Vec::new(),
         };
-        places.into_iter().map(point).collect()
+        positions.into_iter().map(point).collect()
     }
 
     /// As the weight falls, first the misfit falls and then the roughness rises.
     #[test]
     fn the_corner_is_where_roughness_begins_to_rise() {
         for corner in 1..8 {
-            let place = |i: usize| {
+            let position = |i: usize| {
                 let [left, right] = [corner.max(i) - i, corner.max(i) - corner];
                 [3.0 + 2.0 * left as f64, 2.0 * right as f64 - 5.0]
             };
-            assert_eq!(l_curve(&path((0..9).map(place))), Some(corner));
+            assert_eq!(l_curve(&path((0..9).map(position))), Some(corner));
             // In the opposite order the path turns to the other side and has no corner.
-            assert_eq!(l_curve(&path((0..9).rev().map(place))), None);
+            assert_eq!(l_curve(&path((0..9).rev().map(position))), None);
         }
     }
 
@@ -106,8 +106,8 @@ mod tests {
                 at = [at[0] + cosine, at[1] + sine];
                 at
             });
-            let places = std::iter::once([1.0, -2.0]).chain(steps);
-            assert_eq!(l_curve(&path(places)), Some(corner));
+            let positions = std::iter::once([1.0, -2.0]).chain(steps);
+            assert_eq!(l_curve(&path(positions)), Some(corner));
         }
     }
 
@@ -124,8 +124,8 @@ mod tests {
             at = [at[0] + length * cosine, at[1] + length * sine];
             at
         });
-        let places: Vec<_> = std::iter::once([0.0, 0.0]).chain(steps).collect();
-        let corner = l_curve(&path(places)).expect("a corner");
+        let positions: Vec<_> = std::iter::once([0.0, 0.0]).chain(steps).collect();
+        let corner = l_curve(&path(positions)).expect("a corner");
         assert!((3..=5).contains(&corner), "{corner}");
     }
 }

@@ -54,13 +54,13 @@ impl Observation {
     }
 }
 
-/// Observes `kind` at `place` of the response `states`.
+/// Observes `kind` at `position` of the response `states`.
 ///
 /// `input` is the force and the acceleration of the base at that time; `excitation` is that of the whole response.
 /// Accelerations are those of `y`, relative to the base.
 ///
 /// # Panics
-/// If `place` is not within `states`.
+/// If `position` is not within `states`.
 #[inline(always)]
 pub fn observe(
     system: &System,
@@ -68,7 +68,7 @@ pub fn observe(
     nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
-    place: TimePoint,
+    position: TimePoint,
     input: InputSample,
 ) -> Observation {
     let driven = Driven {
@@ -78,12 +78,12 @@ pub fn observe(
     };
     let step = system.grid.step();
     match kind {
-        ChannelKind::Displacement => displacement(step, states, place),
-        ChannelKind::Velocity => velocity(driven, states, place),
+        ChannelKind::Displacement => displacement(step, states, position),
+        ChannelKind::Velocity => velocity(driven, states, position),
         ChannelKind::Acceleration => {
-            let y = displacement(step, states, place);
-            let v = velocity(driven, states, place);
-            acceleration(driven, place.step, place.fraction, input, &y, &v)
+            let y = displacement(step, states, position);
+            let v = velocity(driven, states, position);
+            acceleration(driven, position.step, position.fraction, input, &y, &v)
         }
     }
 }
@@ -96,10 +96,10 @@ pub fn observe_value(
     nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
-    place: TimePoint,
+    position: TimePoint,
     input: InputSample,
 ) -> f64 {
-    observe(system, kind, nodal, excitation, states, place, input).value
+    observe(system, kind, nodal, excitation, states, position, input).value
 }
 
 /// Cubic Hermite weights at `x` of a step of length `h`: value and slope on the left, on the right.
@@ -115,9 +115,9 @@ pub(super) fn hermite(x: f64, h: f64) -> [f64; 4] {
 }
 
 #[inline(always)]
-fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
-    let (y, v, i) = (states.displacement(0), states.velocity(0), place.step);
-    match place.fraction {
+fn displacement(h: f64, states: &Trajectory, position: TimePoint) -> Observation {
+    let (y, v, i) = (states.displacement(0), states.velocity(0), position.step);
+    match position.fraction {
         0.0 => Observation::state(0, y[i]),
         1.0 => Observation::state(2, y[i + 1]),
         x => {
@@ -133,9 +133,9 @@ fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
 }
 
 #[inline(always)]
-fn velocity(driven: Driven, states: &Trajectory, place: TimePoint) -> Observation {
-    let (y, v, i) = (states.displacement(0), states.velocity(0), place.step);
-    match place.fraction {
+fn velocity(driven: Driven, states: &Trajectory, position: TimePoint) -> Observation {
+    let (y, v, i) = (states.displacement(0), states.velocity(0), position.step);
+    match position.fraction {
         0.0 => Observation::state(1, v[i]),
         1.0 => Observation::state(3, v[i + 1]),
         x => {

@@ -128,9 +128,9 @@ fn function(range: Range<f64>, nodes: usize) -> impl Strategy<Value = Vec<f64>> 
     prop_oneof![
         prop::collection::vec(range.clone(), nodes),
         range.prop_map(move |x| vec![x; nodes]),
-        levels.prop_map(move |(first, second, place)| {
+        levels.prop_map(move |(first, second, position)| {
             let mut values = vec![first; nodes];
-            values[place..].fill(second);
+            values[position..].fill(second);
             values
         })
     ]
@@ -392,12 +392,12 @@ proptest! {
             let nodes = NodalObservations { system, nodal, states: &states };
             let seen = simd::run(Observe(nodes, first, around));
             for node in first..case.nodes().min(first + LANES) {
-                let place = TimePoint::node(node, case.nodes());
+                let position = TimePoint::node(node, case.nodes());
                 let kind = ChannelKind::Acceleration;
                 let exact = observe(
-                    system, kind, nodal, case.excitation(), &states, place, surroundings,
+                    system, kind, nodal, case.excitation(), &states, position, surroundings,
                 );
-                let (lane, side) = (node - first, usize::from(place.fraction == 1.0));
+                let (lane, side) = (node - first, usize::from(position.fraction == 1.0));
                 let functions = 1 + system.laws().len();
                 let list = |value: f64, states: [f64; 2], functions: Vec<f64>| {
                     [vec![value], states.to_vec(), functions].concat()

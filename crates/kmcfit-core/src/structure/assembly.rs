@@ -104,7 +104,7 @@ impl Structure {
         let pattern = |ends: &Ends| -> Vec<(usize, f64)> {
             let pairs = free(ends, coordinates).flat_map(|(i, a)| {
                 let other = free(ends, coordinates).filter(move |(j, _)| *j <= i);
-                other.map(move |(j, b)| (Banded::<f64>::place(bandwidth, i, j), a * b))
+                other.map(move |(j, b)| (Banded::<f64>::position(bandwidth, i, j), a * b))
             });
             pairs.collect()
         };

@@ -20,8 +20,8 @@ impl<T: Real> Banded<T> {
         }
     }
 
-    /// Place of the entry `(i, j)`, `j <= i <= j + bandwidth`, among the entries of matrices with this bandwidth.
-    pub fn place(bandwidth: usize, i: usize, j: usize) -> usize {
+    /// VariableRole of the entry `(i, j)`, `j <= i <= j + bandwidth`, among the entries of matrices with this bandwidth.
+    pub fn position(bandwidth: usize, i: usize, j: usize) -> usize {
         i * (bandwidth + 1) + bandwidth - (i - j)
     }
 
@@ -32,8 +32,8 @@ impl<T: Real> Banded<T> {
     /// Adds `factor` times a pattern of places and values.
     #[inline]
     pub fn add(&mut self, pattern: &[(usize, f64)], factor: T) {
-        for (place, value) in pattern {
-            self.entries[*place] = self.entries[*place] + factor.scale(*value);
+        for (position, value) in pattern {
+            self.entries[*position] = self.entries[*position] + factor.scale(*value);
         }
     }
 

@@ -175,8 +175,8 @@ pub fn equivalent_coefficients(
         return Err(solution.status);
     }
     let component = |q: usize, size: f64| {
-        let places = lines.iter().zip(&solution.z);
-        places.map(|(line, t)| line.at(*t)[q] * size).collect()
+        let positions = lines.iter().zip(&solution.z);
+        positions.map(|(line, t)| line.at(*t)[q] * size).collect()
     };
     Ok(NodalCoefficients {
         inertias: vec![mass.to_vec()],

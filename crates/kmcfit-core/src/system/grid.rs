@@ -55,8 +55,8 @@ impl Grid {
 
     /// Index of the node nearest to a time (s).
     pub fn nearest(&self, time: f64) -> usize {
-        let place = ((time - self.start) / self.step()).round().max(0.0);
-        (place as usize).min(self.nodes - 1)
+        let position = ((time - self.start) / self.step()).round().max(0.0);
+        (position as usize).min(self.nodes - 1)
     }
 
     /// Times of all nodes in s.

@@ -90,9 +90,9 @@ impl StageSamples {
     }
 
     /// Value at a point, linear between the ends of its step.
-    pub(crate) fn at(&self, place: TimePoint) -> f64 {
-        let [left, _, right] = self.step(place.step);
-        left * (1.0 - place.fraction) + right * place.fraction
+    pub(crate) fn at(&self, position: TimePoint) -> f64 {
+        let [left, _, right] = self.step(position.step);
+        left * (1.0 - position.fraction) + right * position.fraction
     }
 
     /// True if zero at all stages.
@@ -220,8 +220,8 @@ impl Excitation {
     }
 
     /// The force on the first coordinate and the acceleration of the base at a point.
-    pub fn input_at(&self, place: TimePoint) -> InputSample {
-        let at = |part: Option<&StageSamples>| part.map_or(0.0, |part| part.at(place));
+    pub fn input_at(&self, position: TimePoint) -> InputSample {
+        let at = |part: Option<&StageSamples>| part.map_or(0.0, |part| part.at(position));
         InputSample {
             force: at(self.force(0)),
             base: at(self.frame(0)),

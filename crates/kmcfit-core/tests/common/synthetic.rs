@@ -143,16 +143,16 @@ pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
 /// `dz / dtheta` of all predictions, each row by the root of its sample's weight.
 pub fn weighted_jacobian(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let here = problem.evaluate(theta).unwrap();
-    let roots: Vec<f64> = (problem.channels())
+    let weight_roots: Vec<f64> = (problem.channels())
         .flat_map(|c| (0..c.len()).map(|i| c.weighting().weight(i, c.len()).sqrt()))
         .collect();
-    let mut jacobian = DMatrix::zeros(roots.len(), theta.len());
+    let mut jacobian = DMatrix::zeros(weight_roots.len(), theta.len());
     let mut unit = vec![0.0; theta.len()];
     for j in 0..theta.len() {
         unit[j] = 1.0;
         let changes = problem.predictions_tangent(&here, &unit);
         unit[j] = 0.0;
-        let all = changes.iter().flatten().flatten().zip(&roots);
+        let all = changes.iter().flatten().flatten().zip(&weight_roots);
         for (i, (change, root)) in all.enumerate() {
             jacobian[(i, j)] = root * change;
         }

@@ -66,7 +66,7 @@ const LOSSES: [Loss; 3] = [
 struct ChannelSpec {
     kind: ChannelKind,
     /// Step and share of it.
-    places: Vec<(usize, f64)>,
+    positions: Vec<(usize, f64)>,
     values: Vec<f64>,
     sigmas: Vec<f64>,
     around: Vec<(f64, f64)>,
@@ -128,7 +128,7 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
                 // Or one sample at every node.
                 times = (0..nodes).map(|i| i as f64).collect();
             }
-            let place = |x: &f64| {
+            let position = |x: &f64| {
                 let step = (x.floor() as usize).min(steps - 1);
                 (step, x - step as f64)
             };
@@ -137,7 +137,7 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
             let sensor = list(3, 0.5, 1.5);
             ChannelSpec {
                 kind,
-                places: times.iter().map(place).collect(),
+                positions: times.iter().map(position).collect(),
                 values: list(count, -2.0, 2.0),
                 sigmas: list(count, 0.3, 2.0),
                 around: around.chunks_exact(2).map(|c| (c[0], c[1])).collect(),
@@ -212,7 +212,7 @@ impl Case {
         experiment.initial_parameters = vec![Some(0), Some(1)];
         for (n, samples) in self.channels.iter().enumerate() {
             let time = |(i, x): &(usize, f64)| (*i as f64 + x) * grid.step();
-            let times = samples.places.iter().map(time).collect();
+            let times = samples.positions.iter().map(time).collect();
             let weighting = Weighting::Sigmas(samples.sigmas.clone());
             let around = samples.around.iter().map(|(force, base)| InputSample {
                 force: *force,
@@ -274,10 +274,10 @@ impl Case {
         for (n, samples) in self.channels.iter().enumerate() {
             let [gain, offset, drift] = [0, 1, 2].map(|k| rest[2 + 3 * n + k]);
             let time = |(i, x): (usize, f64)| (i as f64 + x) * self.dt;
-            for (i, &place) in samples.places.iter().enumerate() {
-                let seen = record.seen(samples.kind, &states, place, samples.around[i])
+            for (i, &position) in samples.positions.iter().enumerate() {
+                let seen = record.seen(samples.kind, &states, position, samples.around[i])
                     + samples.fixed_in_space[i];
-                let age = time(place) - time(samples.places[0]);
+                let age = time(position) - time(samples.positions[0]);
                 let model = gain * seen + offset + drift * age;
                 sum += cost(
                     samples.loss,

@@ -139,15 +139,15 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                     let settled: Vec<usize> = (nodes * 5 / 6..nodes).collect();
                     let times: Vec<f64> = settled.iter().map(|i| grid.time(*i)).collect();
                     let relative = settled.iter().map(|i| {
-                        let place = TimePoint::node(*i, nodes);
-                        let around = excitation.input_at(place);
+                        let position = TimePoint::node(*i, nodes);
+                        let around = excitation.input_at(position);
                         let sensed = observe(
                             &system,
                             kind,
                             &nodal,
                             Some(&excitation),
                             &response,
-                            place,
+                            position,
                             around,
                         );
                         sensed.value
@@ -341,7 +341,7 @@ fn samples_between_nodes_have_the_order_of_the_stepper() {
                 let mut most = 0.0f64;
                 for step in 0..nodes - 1 {
                     for fraction in [0.0, 0.1, 0.31, 0.5, 0.77, 0.99] {
-                        let place = TimePoint { step, fraction };
+                        let position = TimePoint { step, fraction };
                         let t = grid.time(step) + fraction * grid.step();
                         let around = InputSample {
                             force: (w * t).cos(),
@@ -353,7 +353,7 @@ fn samples_between_nodes_have_the_order_of_the_stepper() {
                             &nodal,
                             Some(&excitation),
                             &response,
-                            place,
+                            position,
                             around,
                         );
                         most = most.max((seen.value - exact(kind, t)).abs());

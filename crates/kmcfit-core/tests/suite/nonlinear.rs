@@ -229,9 +229,9 @@ fn each_record_has_its_own_friction() {
     let problem = builder.nodes(14_991).build().unwrap();
     let fit = run(&problem);
     let covariance = cramer_rao(&problem, &fit.best.parameters);
-    for (place, friction) in [(3, 0.4), (4, 0.8)] {
-        let error = covariance[(place, place)].sqrt();
-        let found = fit.best.parameters[place];
+    for (position, friction) in [(3, 0.4), (4, 0.8)] {
+        let error = covariance[(position, position)].sqrt();
+        let found = fit.best.parameters[position];
         assert!(
             (found - friction).abs() < 4.0 * error,
             "{found} {friction} +- {error}"

@@ -157,9 +157,9 @@ impl Case {
                 };
                 // Of cubic interpolation, whose error is 2e-4 of the amplitude at 12 samples per period.
                 let at = |t: f64| {
-                    let place = (t / self.spacing).clamp(0.0, (SAMPLES - 1) as f64);
-                    let i = (place as usize).min(SAMPLES - 2);
-                    let s = place - i as f64;
+                    let position = (t / self.spacing).clamp(0.0, (SAMPLES - 1) as f64);
+                    let i = (position as usize).min(SAMPLES - 2);
+                    let s = position - i as f64;
                     let cubic = |q: usize| {
                         let [a, b] = [states[i], states[i + 1]];
                         let h = self.spacing;

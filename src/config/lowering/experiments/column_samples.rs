@@ -1,9 +1,9 @@
 //! Reading of a column of a file: times, and values in SI units within the time window.
 
 use super::Entry;
-use super::data_facts::{FIRST, MEAN, MERGED, MOST_PLACES, RecordNotes, fact};
+use super::data_facts::{FIRST, MEAN, MERGED, MOST_PATHS, RecordNotes, fact};
 use super::unit::QuantityColumn;
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::number_format::significant;
@@ -88,7 +88,7 @@ pub struct ColumnRequest<'a> {
     /// Unit given in the model file.
     pub unit: Option<&'a String>,
     /// Another column of the same file, in the same unit, and its key.
-    pub beside: Option<(&'a str, &'a Place<'a>)>,
+    pub beside: Option<(&'a str, &'a ModelKey<'a>)>,
 }
 
 fn column_name(id: &ColumnId) -> ColumnName {
@@ -190,7 +190,7 @@ fn repeats(entry: &Entry<'_>, table: &Table, times: &Times, notes: &mut RecordNo
     if repeated.groups.is_empty() {
         return;
     }
-    let (count, lines) = (repeated.excess(), repeated.lines(table, MOST_PLACES));
+    let (count, lines) = (repeated.excess(), repeated.lines(table, MOST_PATHS));
     let action = match entry.spec.duplicates.unwrap_or_default() {
         _ if repeated.are_equal => MERGED,
         Duplicates::Mean => MEAN,
@@ -214,7 +214,7 @@ fn repeats(entry: &Entry<'_>, table: &Table, times: &Times, notes: &mut RecordNo
 struct Source<'a> {
     entry: &'a Entry<'a>,
     /// Key of the path.
-    at: Place<'a>,
+    at: ModelKey<'a>,
     name: &'a str,
     format: TableFormat,
     /// The column, and those that are read with it.
@@ -224,7 +224,7 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     fn of(
         wanted: &ColumnRequest<'a>,
-        column: &Place<'a>,
+        column: &ModelKey<'a>,
         (id, own): (&ColumnId, Option<&'a SourceSpec>),
     ) -> Result<Self, InputError> {
         let (entry, spec) = (wanted.entry, wanted.entry.spec);
@@ -258,7 +258,7 @@ impl<'a> Source<'a> {
     }
 
     fn about(&self, error: InputError) -> InputError {
-        match &error.place {
+        match &error.location {
             Location::Argument(name) => {
                 let at = self.entry.at.below(&format!("format.{name}"));
                 at.file.error_about(&at.key, error)
@@ -399,7 +399,7 @@ fn times(
     })
 }
 
-fn two_times(at: &Place<'_>) -> InputError {
+fn two_times(at: &ModelKey<'_>) -> InputError {
     at.error_in(
         "sample_rate",
         "both a sampling rate and a column of times are given",

@@ -271,7 +271,7 @@ fn opposite_signs(
 ) -> Vec<Finding> {
     let channels = &record.channels;
     let pairs = (channels.iter().enumerate())
-        .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
+        .flat_map(|(location, high)| channels[..location].iter().map(move |low| (low, high)));
     let opposite = pairs.filter(|(low, high)| {
         let gains = gain_sign(spec, low.kind).zip(gain_sign(spec, high.kind));
         gains.is_some_and(|(one, other)| {

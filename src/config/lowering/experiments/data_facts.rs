@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::rc::Rc;
 
 /// Most places that a fact lists.
-pub const MOST_PLACES: usize = 1000;
+pub const MOST_PATHS: usize = 1000;
 /// Most places in a sentence.
 const IN_WORDS: usize = 3;
 
@@ -90,7 +90,7 @@ pub fn fact(kind: &str, text: &str, action: Action, quantities: Value) -> Findin
 
 /// A gap in the times of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct GapPlace {
+pub struct GapLocation {
     /// Last sample before the gap, s.
     pub from: f64,
     /// First sample after it, s.
@@ -105,8 +105,8 @@ pub fn time(t: f64) -> String {
 }
 
 /// The first gaps of all.
-pub fn gaps_in_words(places: &[GapPlace], count: usize) -> String {
-    let each = places.iter().take(IN_WORDS).map(|gap| {
+pub fn gaps_in_words(positions: &[GapLocation], count: usize) -> String {
+    let each = positions.iter().take(IN_WORDS).map(|gap| {
         let (from, to) = (time(gap.from), time(gap.to));
         let length = significant(gap.to - gap.from, 3);
         format!(
@@ -118,16 +118,16 @@ pub fn gaps_in_words(places: &[GapPlace], count: usize) -> String {
 }
 
 /// The first spans of all.
-pub fn spans_in_words(places: &[[f64; 2]]) -> String {
-    let each = places.iter().take(IN_WORDS);
+pub fn spans_in_words(positions: &[[f64; 2]]) -> String {
+    let each = positions.iter().take(IN_WORDS);
     let each = each.map(|[from, to]| format!("{} to {} s", time(*from), time(*to)));
-    listed(each.collect(), places.len())
+    listed(each.collect(), positions.len())
 }
 
 /// The first times of all.
-pub fn times_in_words(places: &[f64], count: usize) -> String {
+pub fn times_in_words(positions: &[f64], count: usize) -> String {
     listed(
-        places.iter().take(IN_WORDS).map(|t| time(*t)).collect(),
+        positions.iter().take(IN_WORDS).map(|t| time(*t)).collect(),
         count,
     )
 }

@@ -4,7 +4,7 @@ use super::Entry;
 use super::column_samples::{self, ColumnRequest, ColumnSamples};
 use super::data_facts::{RecordNotes, USED};
 use super::faults::{Column, is_coarse, quantisation_step};
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::units::Measurand;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
@@ -116,7 +116,12 @@ pub(in crate::config) fn known_stretches(values: &[f64]) -> Vec<Range<usize>> {
     stretches
 }
 
-fn gaps(at: &Place<'_>, source: &ColumnSamples, known: &[Range<usize>], zero: f64) -> InputError {
+fn gaps(
+    at: &ModelKey<'_>,
+    source: &ColumnSamples,
+    known: &[Range<usize>],
+    zero: f64,
+) -> InputError {
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
     let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
     let error = at
@@ -198,7 +203,7 @@ fn signal(
 }
 
 /// A force given by its shape instead of samples.
-pub fn shape(at: &Place<'_>, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
+pub fn shape(at: &ModelKey<'_>, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
     let at = at.below("force");
     let Some(shape) = spec.shape else {
         return Err(at
@@ -237,7 +242,7 @@ pub fn shape(at: &Place<'_>, spec: &ForceSpec) -> Result<ExcitationShape, InputE
 }
 
 /// Refuses unknown and missing keys of a shape, and invalid values.
-fn shape_keys(at: &Place<'_>, shape: ForceShape, spec: &ForceSpec) -> Result<(), InputError> {
+fn shape_keys(at: &ModelKey<'_>, shape: ForceShape, spec: &ForceSpec) -> Result<(), InputError> {
     let keys = [
         ("amplitude", spec.amplitude),
         ("frequency", spec.frequency),

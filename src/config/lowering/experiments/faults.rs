@@ -3,7 +3,7 @@
 use super::Entry;
 use super::column_samples::{ColumnSamples, PresentRows};
 use super::data_facts::{
-    Action, EXCLUDED, GapPlace, INTERPOLATED, MISSING, MOST_PLACES, RecordNotes, USED, fact,
+    Action, EXCLUDED, GapLocation, INTERPOLATED, MISSING, MOST_PATHS, RecordNotes, USED, fact,
     gaps_in_words, spans_in_words, time, times_in_words,
 };
 use crate::finding::Finding;
@@ -121,26 +121,26 @@ impl Column<'_> {
         if all.is_empty() {
             return;
         }
-        let places = all.iter().take(MOST_PLACES).map(|i| GapPlace {
+        let positions = all.iter().take(MOST_PATHS).map(|i| GapLocation {
             from: self.in_file(times, *i),
             to: self.in_file(times, i + 1),
             samples: (spacings[*i] / usual - 1.0).round().max(1.0) as usize,
         });
-        let places: Vec<GapPlace> = places.collect();
-        let longest = places
+        let positions: Vec<GapLocation> = positions.collect();
+        let longest = positions
             .iter()
             .copied()
             .max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
         let (channel, gaps) = (self.name, counted(all.len(), "gap"));
         let text = format!(
             "{gaps} in the {channel}, {}",
-            gaps_in_words(&places, all.len())
+            gaps_in_words(&positions, all.len())
         );
         let action = if self.is_input { INTERPOLATED } else { MISSING };
-        let found = json!({"channel": channel, "count": all.len(), "places": places});
+        let found = json!({"channel": channel, "count": all.len(), "places": positions});
         let fact = fact("gaps", &text, action, found);
         notes.state(&self.entry.name(), fact);
-        if let (true, Some(GapPlace { from, to, .. })) = (self.is_input, longest) {
+        if let (true, Some(GapLocation { from, to, .. })) = (self.is_input, longest) {
             let text = format!(
                 "the {channel} has {}, across which it is interpolated, the longest from {} to {} s; keep a part without them by \
                  `window`",
@@ -212,16 +212,16 @@ impl Column<'_> {
         };
         let (text, found, warning, of_warning) = match fault {
             FaultName::Dropouts => {
-                let rows = samples.chunk_by(|a, b| a + 1 == *b).take(MOST_PLACES);
-                let places = rows.map(|row| [row[0], row[row.len() - 1]].map(|i| at(&i)));
-                let places: Vec<[f64; 2]> = places.collect();
-                let [from, to] = places[0];
+                let rows = samples.chunk_by(|a, b| a + 1 == *b).take(MOST_PATHS);
+                let positions = rows.map(|row| [row[0], row[row.len() - 1]].map(|i| at(&i)));
+                let positions: Vec<[f64; 2]> = positions.collect();
+                let [from, to] = positions[0];
                 (
                     format!(
                         "{of_samples} of the {channel} held at a constant value, {}",
-                        spans_in_words(&places)
+                        spans_in_words(&positions)
                     ),
-                    json!({"places": places}),
+                    json!({"places": positions}),
                     format!(
                         "{count} samples of the {channel} are held at a constant value, from {} to {} s at first, as by a dropout; {way_out}",
                         time(from),
@@ -231,17 +231,17 @@ impl Column<'_> {
                 )
             }
             FaultName::Spikes => {
-                let places: Vec<f64> = samples.iter().take(MOST_PLACES).map(at).collect();
-                let (spikes, all) = (counted(count, "spike"), times_in_words(&places, count));
+                let positions: Vec<f64> = samples.iter().take(MOST_PATHS).map(at).collect();
+                let (spikes, all) = (counted(count, "spike"), times_in_words(&positions, count));
                 (
                     format!("{spikes} in the {channel}, at {all} s"),
-                    json!({"places": places}),
+                    json!({"places": positions}),
                     format!(
                         "{of_samples} of the {channel} {} far from the neighbours, the first at {} s; {way_out}",
                         if count == 1 { "is" } else { "are" },
-                        time(places[0])
+                        time(positions[0])
                     ),
-                    json!({"first": places[0]}),
+                    json!({"first": positions[0]}),
                 )
             }
             FaultName::Saturation => {

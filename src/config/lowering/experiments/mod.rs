@@ -12,7 +12,7 @@ mod unit;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::Unit;
@@ -148,7 +148,7 @@ pub struct HoldOut {
 /// One entry of `experiments`.
 #[derive(Debug, Clone)]
 pub(super) struct Entry<'a> {
-    pub at: Place<'a>,
+    pub at: ModelKey<'a>,
     pub number: usize,
     pub spec: &'a ExperimentSpec,
 }
@@ -156,7 +156,7 @@ pub(super) struct Entry<'a> {
 impl<'a> Entry<'a> {
     pub fn new(file: &'a ModelFile, number: usize) -> Self {
         Self {
-            at: Place::new(file, format!("experiments[{number}]")),
+            at: ModelKey::new(file, format!("experiments[{number}]")),
             number,
             spec: &file.spec.experiments[number],
         }
@@ -175,8 +175,8 @@ impl<'a> Entry<'a> {
     /// A finding about the experiment.
     fn placed(&self, finding: Finding) -> Finding {
         let name = self.name();
-        let place = format!("{} ({name})", self.at.key);
-        finding.at(&place).with("experiment", name)
+        let location = format!("{} ({name})", self.at.key);
+        finding.at(&location).with("experiment", name)
     }
 }
 

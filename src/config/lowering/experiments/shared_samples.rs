@@ -26,8 +26,8 @@ pub fn refuse_one_column_twice(entry: &Entry<'_>) -> Result<(), InputError> {
     .into_iter()
     .filter_map(|(name, column)| Some((name, column.as_ref()?)))
     .collect();
-    for (place, (name, column)) in named.iter().enumerate() {
-        let earlier = named[..place].iter().find(|(_, other)| other == column);
+    for (location, (name, column)) in named.iter().enumerate() {
+        let earlier = named[..location].iter().find(|(_, other)| other == column);
         if let Some((other, _)) = earlier {
             return Err(refused(entry, [other, name]));
         }

@@ -1,6 +1,6 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
@@ -14,7 +14,7 @@ pub const UNIT_ASSUMED: &str = "unit_assumed";
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
     /// The experiment.
-    pub at: &'a Place<'a>,
+    pub at: &'a ModelKey<'a>,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     pub kind: Measurand,
@@ -83,8 +83,8 @@ impl QuantityColumn<'_> {
         let unit = scaled.unit;
         let differs = |other: &Unit| !other.is_arbitrary() && other.factor() != unit.factor();
         if let Some(other) = other.filter(differs) {
-            let places = ["the model", "the file says"];
-            let warning = self.differs("unit_differs_from_file", places, [&unit, &other]);
+            let positions = ["the model", "the file says"];
+            let warning = self.differs("unit_differs_from_file", positions, [&unit, &other]);
             warnings.push(warning.at(&units_key));
         }
         Ok(scaled)
@@ -123,8 +123,8 @@ impl QuantityColumn<'_> {
         }
         if let Some(unit) = stated.explicit(kind) {
             if let Some(other) = suffix.filter(|other| differs(other, unit)) {
-                let places = ["the file's row of units", "its name ends in"];
-                let warning = self.differs("unit_differs_from_name", places, [&unit, &other]);
+                let positions = ["the file's row of units", "its name ends in"];
+                let warning = self.differs("unit_differs_from_name", positions, [&unit, &other]);
                 warnings.push(warning.at(&columns_key));
             }
             return Ok(unit);
@@ -172,8 +172,8 @@ impl QuantityColumn<'_> {
     /// samples that they belong to.
     pub fn same_as(&self, used: Unit, key: &str, warnings: &mut Vec<Finding>) {
         if let Some(own) = self.stated().filter(|own| own.factor() != used.factor()) {
-            let places = ["the samples", "the file says"];
-            let warning = self.differs("sigma_unit_differs", places, [&used, &own]);
+            let positions = ["the samples", "the file says"];
+            let warning = self.differs("sigma_unit_differs", positions, [&used, &own]);
             warnings.push(warning.at(key));
         }
     }

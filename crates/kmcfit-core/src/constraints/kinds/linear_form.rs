@@ -64,8 +64,8 @@ pub(super) fn group(
             continue;
         }
         let key = entries.iter().map(|(j, a)| (*j, a.to_bits())).collect();
-        let place = *known.entry(key).or_insert(rows.len());
-        match rows.get_mut(place) {
+        let position = *known.entry(key).or_insert(rows.len());
+        match rows.get_mut(position) {
             None => rows.push(PendingRow {
                 entries,
                 limits: [lower, upper],

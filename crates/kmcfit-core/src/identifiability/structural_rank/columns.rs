@@ -8,21 +8,25 @@ use crate::system::{Method, TimePoint};
 pub(super) fn visible_nodes(problem: &Problem) -> Vec<bool> {
     let nodes = problem.functions.nodes();
     let mut last = None;
-    for (kind, place) in samples(problem).map(|(_, kind, place)| (kind, place)) {
-        last = last.max(last_acting(problem, kind, place));
+    for (kind, position) in samples(problem).map(|(_, kind, position)| (kind, position)) {
+        last = last.max(last_acting(problem, kind, position));
     }
     (0..nodes).map(|i| last.is_some_and(|l| i <= l)).collect()
 }
 
 /// Last node whose values affect a sample; `None` if none does.
-pub(super) fn last_acting(problem: &Problem, kind: ChannelKind, place: TimePoint) -> Option<usize> {
-    match (kind, place.as_node(), problem.system.method) {
+pub(super) fn last_acting(
+    problem: &Problem,
+    kind: ChannelKind,
+    position: TimePoint,
+) -> Option<usize> {
+    match (kind, position.as_node(), problem.system.method) {
         (ChannelKind::Acceleration, Some(node), _) => Some(node),
         (_, Some(0), _) => None,
         // The midpoint rule computes the displacement at the end from the velocity half-way.
         (ChannelKind::Displacement, Some(node), Method::Midpoint) => Some(node - 1),
         (_, Some(node), _) => Some(node),
-        (_, None, _) => Some(place.step + 1),
+        (_, None, _) => Some(position.step + 1),
     }
 }
 
@@ -30,7 +34,7 @@ fn samples(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimeP
     let experiments = problem.experiments.iter().enumerate();
     experiments.flat_map(|(e, experiment)| {
         let channels = experiment.channels.iter();
-        channels.flat_map(move |c| c.places().map(move |p| (e, c.kind(), p)))
+        channels.flat_map(move |c| c.positions().map(move |p| (e, c.kind(), p)))
     })
 }
 

@@ -28,15 +28,15 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
                     && channel.filter().is_empty();
                 let acts = |p: &TimePoint| last_acting(problem, channel.kind(), *p).is_some();
                 others += match known {
-                    true => channel.places().filter(acts).count(),
+                    true => channel.positions().filter(acts).count(),
                     false => channel.len(),
                 };
                 continue;
             }
-            for place in channel.places() {
-                let (node, fraction) = match place.as_node() {
+            for position in channel.positions() {
+                let (node, fraction) = match position.as_node() {
                     Some(node) => (node, 0.0),
-                    None => (place.step, place.fraction),
+                    None => (position.step, position.fraction),
                 };
                 let key = (
                     experiment.coefficient_set,
@@ -44,7 +44,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
                     node,
                     f64::to_bits(fraction),
                 );
-                let (_, members) = groups.entry(key).or_insert((place, Vec::new()));
+                let (_, members) = groups.entry(key).or_insert((position, Vec::new()));
                 if !members.contains(&e) {
                     members.push(e);
                 }
@@ -54,14 +54,14 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
     let mut inputs: BTreeMap<Vec<usize>, Inputs> = BTreeMap::new();
     let mut total = others;
     let mut dependent = false;
-    for ((_, kind, ..), (place, members)) in &groups {
-        let Some(last) = last_acting(problem, *kind, *place) else {
+    for ((_, kind, ..), (position, members)) in &groups {
+        let Some(last) = last_acting(problem, *kind, *position) else {
             continue;
         };
         let inputs = inputs
             .entry(members.clone())
             .or_insert_with(|| Inputs::of(problem, members));
-        let mut rank = inputs.rank(*kind, *place, last);
+        let mut rank = inputs.rank(*kind, *position, last);
         if *kind == ChannelKind::Displacement && inputs.stepwise {
             rank = rank.min(inputs.most_of_step(last));
         }
@@ -161,12 +161,12 @@ impl Inputs {
     }
 
     /// Number of independent inputs that affect a sample.
-    fn rank(&self, kind: ChannelKind, place: TimePoint, last: usize) -> usize {
+    fn rank(&self, kind: ChannelKind, position: TimePoint, last: usize) -> usize {
         let stage = |step: Option<usize>, s: usize| match step {
             Some(step) => self.after[step.min(self.after.len() - 1)][s],
             None => self.initially,
         };
-        match (kind, place.as_node(), self.method) {
+        match (kind, position.as_node(), self.method) {
             (ChannelKind::Displacement, Some(node), Method::Midpoint) => {
                 stage(node.checked_sub(1), 0)
             }

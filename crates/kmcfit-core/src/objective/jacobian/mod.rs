@@ -24,12 +24,12 @@ impl Problem {
             return self.jacobian_of_structure(evaluation);
         }
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
-        let order = self.places();
+        let order = self.positions();
         self.each_row_block(evaluation, &order, |block| {
-            for (place, j) in order.iter().enumerate().take(block.begun()) {
+            for (position, j) in order.iter().enumerate().take(block.begun()) {
                 let mut column = jacobian.column_mut(*j);
                 let rows = block.first..block.first + block.count;
-                column.as_mut_slice()[rows].copy_from_slice(block.column(place));
+                column.as_mut_slice()[rows].copy_from_slice(block.column(position));
             }
             block
         });
@@ -122,7 +122,7 @@ impl Problem {
 
     /// Parameter of each column of the sensitivities, ordered by the first node that it affects; columns cost nothing before
     /// that node.
-    pub(crate) fn places(&self) -> Vec<usize> {
+    pub(crate) fn positions(&self) -> Vec<usize> {
         let first = self.functions.first_nodes().into_iter();
         order_by(&first.map(|node| node as usize).collect::<Vec<_>>())
     }
@@ -138,7 +138,7 @@ impl Problem {
         self.system.structure.is_one() && self.channels().all(is_plain)
     }
 
-    /// Passes the rows of the Jacobian to `take` in blocks, with columns in `order` ([`Problem::places`]) and without the
+    /// Passes the rows of the Jacobian to `take` in blocks, with columns in `order` ([`Problem::positions`]) and without the
     /// contributions of sensors and filters; `take` returns a block to fill next. Rows of one channel come in order, those of
     /// several channels alternate.
     pub(crate) fn each_row_block(
@@ -207,19 +207,19 @@ fn sweep(
 ) -> Vec<[f64; 2]> {
     let layout = SensitivityLayout::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
-    let places = order.len() + 2 * usize::from(is_later);
+    let positions = order.len() + 2 * usize::from(is_later);
     let mut tangents = match is_later {
         false => layout.tangents(),
         true => layout.tangents_from_any_state(),
     };
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
-        let is_before = |i: &usize| channel.place(view, *i).step < steps.start;
+        let is_before = |i: &usize| channel.position(view, *i).step < steps.start;
         let first = match steps.start {
             0 => 0,
             _ => (0..channel.len()).take_while(is_before).count(),
         };
-        let mut block = RowBlock::new(places);
+        let mut block = RowBlock::new(positions);
         block.restart(row + first);
         readers.push((JacobianRows::new(channel, view, first), block));
         row += channel.len();
@@ -249,11 +249,11 @@ fn sweep(
             give(block);
         }
     }
-    let end = |place: usize| {
-        let [y, v] = tangents.states(place / LANES)[last];
-        [y[place % LANES], v[place % LANES]]
+    let end = |position: usize| {
+        let [y, v] = tangents.states(position / LANES)[last];
+        [y[position % LANES], v[position % LANES]]
     };
-    (0..places).map(end).collect()
+    (0..positions).map(end).collect()
 }
 
 /// Adds the derivatives with respect to the sensor parameters of one channel to its rows from `row`, and filters them.
@@ -354,16 +354,16 @@ mod tests {
                 let theta = problem.start();
                 let evaluation = problem.evaluate(&theta).expect("a motion");
                 let expected = problem.jacobian_by_columns(&evaluation);
-                let order = problem.places();
+                let order = problem.positions();
                 let mut found = DMatrix::zeros(expected.nrows(), expected.ncols());
                 problem.each_row_block(&evaluation, &order, |mut block| {
-                    for (place, j) in order.iter().enumerate() {
-                        if place < block.begun() {
+                    for (position, j) in order.iter().enumerate() {
+                        if position < block.begun() {
                             let rows = block.first..block.first + block.count;
                             let column = &mut found.column_mut(*j);
-                            column.as_mut_slice()[rows].copy_from_slice(block.column(place));
+                            column.as_mut_slice()[rows].copy_from_slice(block.column(position));
                         }
-                        block.column_mut(place).fill(f64::NAN);
+                        block.column_mut(position).fill(f64::NAN);
                     }
                     block
                 });

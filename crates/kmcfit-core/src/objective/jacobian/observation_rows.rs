@@ -108,16 +108,16 @@ impl<'a> JacobianRows<'a> {
         } else {
             batch.count = 0;
             for l in 0..most {
-                let place = self.channel.place(self.view, self.next + l);
-                if place.step >= steps.end {
+                let position = self.channel.position(self.view, self.next + l);
+                if position.step >= steps.end {
                     break;
                 }
                 batch.count = l + 1;
-                batch.nodes[l] = place.step - steps.start;
+                batch.nodes[l] = position.step - steps.start;
                 if self.kind == ObservationKind::Displacements {
-                    batch.nodes[l] += usize::from(place.fraction == 1.0);
+                    batch.nodes[l] += usize::from(position.fraction == 1.0);
                 } else {
-                    batch.at_left[l] = place.fraction == 0.0;
+                    batch.at_left[l] = position.fraction == 0.0;
                     batch.set(l, &self.channel.sensed(self.view, self.next + l));
                 }
             }
@@ -174,10 +174,10 @@ impl BatchSensitivity<'_> {
         let gain = Eight::splat(arithmetic, self.gain);
         let count = self.batch.count;
         let begun = self.tangents.begun_groups() * LANES;
-        let (row, places) = (block.count, begun.min(block.places()));
-        block.widen(places);
+        let (row, positions) = (block.count, begun.min(block.positions()));
+        block.widen(positions);
         block.count += count;
-        for (g, first) in (0..places).step_by(LANES).enumerate() {
+        for (g, first) in (0..positions).step_by(LANES).enumerate() {
             let mut answers = [Eight::splat(arithmetic, 0.0); LANES];
             if self.tangents.has_begun(g) {
                 // Lanes without a sample are unused.
@@ -205,9 +205,9 @@ impl BatchSensitivity<'_> {
                     self.add_constants(arithmetic, g, &mut answers);
                 }
             }
-            for (place, answer) in (first..places).zip(&answers) {
+            for (position, answer) in (first..positions).zip(&answers) {
                 let answer = (gain * *answer).row();
-                let rows = &mut block.column_mut(place)[row..];
+                let rows = &mut block.column_mut(position)[row..];
                 match rows.first_chunk_mut::<LANES>() {
                     // Entries below the last row are undefined.
                     Some(rows) => *rows = answer,

@@ -47,16 +47,16 @@ impl<'a> SensitivityLayout<'a> {
             estimated.filter_map(|(state, index)| Some((state, column_of[scalars + index?])));
         let assembly = functions.coefficient_set(experiment.coefficient_set);
         // A known part, which is constant, and the function that it is added to have slots of their own in a group.
-        let slot_of = |(place, f): (usize, usize), j: usize| (column_of[j] / LANES, place, f);
+        let slot_of = |(position, f): (usize, usize), j: usize| (column_of[j] / LANES, position, f);
         let mut slots: Vec<(usize, usize, usize)> = (assembly.parts())
             .flat_map(|part| (functions.ranges()[part.1].clone()).map(move |j| (part, j)))
             .map(|(part, j)| slot_of(part, j))
             .collect();
         slots.sort_unstable();
         slots.dedup();
-        let layout = |(place, f): (usize, usize)| {
+        let layout = |(position, f): (usize, usize)| {
             let lane = |j: usize| {
-                let slot = slots.partition_point(|slot| *slot < slot_of((place, f), j));
+                let slot = slots.partition_point(|slot| *slot < slot_of((position, f), j));
                 (slot, column_of[j] % LANES)
             };
             let own = (0..slots.len()).filter(|slot| slots[*slot].2 == f);

@@ -17,8 +17,8 @@ use crate::qp::Subproblem;
 #[derive(Debug, Clone)]
 pub struct BandedFactor {
     rows: TriangularRows,
-    /// Place of each variable.
-    places: Vec<u32>,
+    /// VariableRole of each variable.
+    positions: Vec<u32>,
 }
 
 impl BandedFactor {
@@ -34,13 +34,15 @@ impl BandedFactor {
         }
         Some(Self {
             rows,
-            places: chain.places,
+            positions: chain.positions,
         })
     }
 
     /// `C g` for the combination of the variables with these entries, and its variance `g^T C g`.
     pub fn times(&self, entries: &[(usize, f64)]) -> (Vec<f64>, f64) {
-        let at_places = entries.iter().map(|(j, a)| (self.places[*j] as usize, *a));
+        let at_places = entries
+            .iter()
+            .map(|(j, a)| (self.positions[*j] as usize, *a));
         let mut errors = self.rows.substitute_transposed(at_places);
         for (i, error) in errors.iter_mut().enumerate() {
             if self.rows.is_exact(i) {
@@ -49,7 +51,10 @@ impl BandedFactor {
         }
         let variance = errors.iter().map(|y| y * y).sum();
         let by_place = self.rows.substitute_right(&errors);
-        let by_variable = self.places.iter().map(|place| by_place[*place as usize]);
+        let by_variable = self
+            .positions
+            .iter()
+            .map(|position| by_place[*position as usize]);
         (by_variable.collect(), variance)
     }
 }

@@ -76,8 +76,8 @@ impl Front {
         self.block += 1;
         self.own = own.len();
         self.columns.clear();
-        for place in own {
-            self.meet(place);
+        for position in own {
+            self.meet(position);
         }
         for k in self.before.own..self.before.columns.len() {
             self.meet(self.before.columns[k]);
@@ -85,25 +85,25 @@ impl Front {
     }
 
     /// Registers a variable of the following rows.
-    pub fn meet(&mut self, place: u32) {
-        if self.met[place as usize] != self.block {
-            self.met[place as usize] = self.block;
-            self.columns.push(place);
+    pub fn meet(&mut self, position: u32) {
+        if self.met[position as usize] != self.block {
+            self.met[position as usize] = self.block;
+            self.columns.push(position);
         }
     }
 
     /// Takes over the remaining rows of the previous front, once all variables are registered.
     pub fn settle(&mut self) {
         self.columns[self.own..].sort_unstable();
-        for (k, place) in self.columns.iter().enumerate() {
-            self.column[*place as usize] = k as u32;
+        for (k, position) in self.columns.iter().enumerate() {
+            self.column[*position as usize] = k as u32;
         }
         let (n, sides) = (self.columns.len(), self.sides);
         let before = &self.before;
         let (first, end) = (before.own, before.columns.len());
         let take = |from: &[f64], to: &mut [f64]| {
-            for (place, a) in before.columns[first..].iter().zip(&from[first..end]) {
-                to[self.column[*place as usize] as usize] = *a;
+            for (position, a) in before.columns[first..].iter().zip(&from[first..end]) {
+                to[self.column[*position as usize] as usize] = *a;
             }
             to[n..].copy_from_slice(&from[end..end + sides]);
         };
@@ -121,8 +121,8 @@ impl Front {
     pub fn add_tie(&mut self, entries: impl Iterator<Item = (u32, f64)>, right: f64) {
         let n = self.columns.len();
         let row = self.ties.add();
-        for (place, a) in entries {
-            row[self.column[place as usize] as usize] = a;
+        for (position, a) in entries {
+            row[self.column[position as usize] as usize] = a;
         }
         row[n..].fill(right);
         let largest = row[..n].iter().fold(0.0f64, |most, a| most.max(a.abs()));
@@ -139,9 +139,9 @@ impl Front {
     ) {
         let n = self.columns.len();
         let row = self.rows.add();
-        for (place, a) in entries {
-            row[self.column[place as usize] as usize] = a;
-            let size = &mut self.size[place as usize];
+        for (position, a) in entries {
+            row[self.column[position as usize] as usize] = a;
+            let size = &mut self.size[position as usize];
             *size = size.max(a.abs());
         }
         row[n..].iter_mut().zip(right).for_each(|(b, f)| *b = f);

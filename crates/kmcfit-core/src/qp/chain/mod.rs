@@ -38,8 +38,8 @@ pub fn minimise(sub: &Subproblem, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>>
 /// Elimination order; variables are numbered by their places in it.
 struct Chain<'a> {
     sub: &'a Subproblem,
-    /// Place of each variable.
-    places: Vec<u32>,
+    /// VariableRole of each variable.
+    positions: Vec<u32>,
     /// Variables by place.
     variables: Vec<u32>,
     /// First place of each block, and one past the last.
@@ -63,9 +63,9 @@ impl Buckets {
         let mut next = starts.clone();
         let mut rows = vec![0u32; items.len()];
         for (i, b) in items.iter().enumerate() {
-            let place = &mut next[*b as usize];
-            rows[*place as usize] = i as u32;
-            *place += 1;
+            let position = &mut next[*b as usize];
+            rows[*position as usize] = i as u32;
+            *position += 1;
         }
         Self { starts, rows }
     }
@@ -89,9 +89,9 @@ impl<'a> Chain<'a> {
             .map(|station| last - station)
             .collect();
         let variables = Buckets::new(blocks, &own);
-        let mut places = vec![0u32; sub.variables];
-        for (place, j) in variables.rows.iter().enumerate() {
-            places[*j as usize] = place as u32;
+        let mut positions = vec![0u32; sub.variables];
+        for (position, j) in variables.rows.iter().enumerate() {
+            positions[*j as usize] = position as u32;
         }
         let entry = |rows: &Rows| -> Vec<u32> {
             let first = |i| rows.row(i).map(|(j, _)| own[j]).min().unwrap_or(0);
@@ -108,7 +108,7 @@ impl<'a> Chain<'a> {
         let width = widest(blocks, &entered, &own);
         (width <= WIDEST).then(|| Self {
             sub,
-            places,
+            positions,
             firsts: variables.starts,
             variables: variables.rows,
             residuals: Buckets::new(blocks, &residuals),
@@ -123,31 +123,31 @@ impl<'a> Chain<'a> {
     /// Assembles the `front` of `block` from its rows and those remaining from the previous front.
     fn assemble(&self, block: usize, front: &mut Front, targets: &[Vec<f64>]) {
         let sub = self.sub;
-        let place = |(j, a): (usize, f64)| (self.places[j], a);
+        let position = |(j, a): (usize, f64)| (self.positions[j], a);
         front.begin(self.firsts[block]..self.firsts[block + 1]);
         for i in self.residuals.of(block) {
             sub.residuals
                 .row(i)
-                .for_each(|(j, _)| front.meet(self.places[j]));
+                .for_each(|(j, _)| front.meet(self.positions[j]));
         }
         for i in self.equalities.of(block) {
             sub.equalities
                 .row(i)
-                .for_each(|(j, _)| front.meet(self.places[j]));
+                .for_each(|(j, _)| front.meet(self.positions[j]));
         }
         front.settle();
         for i in self.equalities.of(block) {
             let right = sub.equalities.right()[i];
-            front.add_tie(sub.equalities.row(i).map(place), right);
+            front.add_tie(sub.equalities.row(i).map(position), right);
         }
         for i in self.residuals.of(block) {
             let right = targets.iter().map(|f| f[i]);
-            front.add_row(sub.residuals.row(i).map(place), right);
+            front.add_row(sub.residuals.row(i).map(position), right);
         }
         for &j in self.variables_of(block) {
             let d = sub.proximal[j as usize];
             if d > 0.0 {
-                let row = [(self.places[j as usize], d.sqrt())];
+                let row = [(self.positions[j as usize], d.sqrt())];
                 front.add_row(row, targets.iter().map(|_| 0.0));
             }
         }
@@ -159,7 +159,10 @@ impl<'a> Chain<'a> {
 
     /// Values by variable, from values by place.
     fn in_order(&self, by_place: &[f64]) -> Option<Vec<f64>> {
-        let values = self.places.iter().map(|place| by_place[*place as usize]);
+        let values = self
+            .positions
+            .iter()
+            .map(|position| by_place[*position as usize]);
         let values: Vec<f64> = values.collect();
         values.iter().all(|z| z.is_finite()).then_some(values)
     }

@@ -5,7 +5,7 @@
 pub struct TriangularRows {
     variables: usize,
     sides: usize,
-    places: Vec<u32>,
+    positions: Vec<u32>,
     starts: Vec<usize>,
     columns: Vec<u32>,
     values: Vec<f64>,
@@ -21,7 +21,7 @@ impl TriangularRows {
         Self {
             variables,
             sides,
-            places: Vec::with_capacity(variables),
+            positions: Vec::with_capacity(variables),
             starts: vec![0],
             columns: Vec::new(),
             values: Vec::new(),
@@ -35,7 +35,7 @@ impl TriangularRows {
     /// columns, followed by the right-hand sides.
     pub fn push(&mut self, pivot: usize, columns: &[u32], row: &[f64], is_exact: bool) {
         self.exact.push(is_exact);
-        self.places.push(columns[pivot]);
+        self.positions.push(columns[pivot]);
         self.pivots.push(row[pivot]);
         for (k, (column, a)) in columns.iter().zip(row).enumerate() {
             if *a != 0.0 && k != pivot {
@@ -52,12 +52,12 @@ impl TriangularRows {
         self.exact[i]
     }
 
-    /// Place of the variable that row `i` determines, its coefficient, and places and coefficients of the others.
+    /// VariableRole of the variable that row `i` determines, its coefficient, and places and coefficients of the others.
     pub fn row(&self, i: usize) -> (u32, f64, impl Iterator<Item = (u32, f64)> + '_) {
         let range = self.starts[i]..self.starts[i + 1];
         let columns = self.columns[range.clone()].iter().copied();
         let others = columns.zip(self.values[range].iter().copied());
-        (self.places[i], self.pivots[i], others)
+        (self.positions[i], self.pivots[i], others)
     }
 
     /// Back substitution for one right-hand side; variables by place.
@@ -72,10 +72,10 @@ impl TriangularRows {
 
     fn substituted(&self, right: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut z = vec![0.0; self.variables];
-        for i in (0..self.places.len()).rev() {
-            let (place, pivot, others) = self.row(i);
+        for i in (0..self.positions.len()).rev() {
+            let (position, pivot, others) = self.row(i);
             let known: f64 = others.map(|(j, a)| a * z[j as usize]).sum();
-            z[place as usize] = (right(i) - known) / pivot;
+            z[position as usize] = (right(i) - known) / pivot;
         }
         z
     }
@@ -83,11 +83,11 @@ impl TriangularRows {
     /// Solution `y` of `R^T y = g`, one entry for each row, with the `entries` of `g` by place.
     pub fn substitute_transposed(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut remaining = vec![0.0; self.variables];
-        entries.for_each(|(place, a)| remaining[place] += a);
-        let mut y = Vec::with_capacity(self.places.len());
-        for i in 0..self.places.len() {
-            let (place, pivot, others) = self.row(i);
-            let value = remaining[place as usize] / pivot;
+        entries.for_each(|(position, a)| remaining[position] += a);
+        let mut y = Vec::with_capacity(self.positions.len());
+        for i in 0..self.positions.len() {
+            let (position, pivot, others) = self.row(i);
+            let value = remaining[position as usize] / pivot;
             if value != 0.0 {
                 others.for_each(|(j, a)| remaining[j as usize] -= a * value);
             }

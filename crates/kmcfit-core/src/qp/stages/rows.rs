@@ -61,9 +61,9 @@ impl LooseRows {
         let mut next = first.clone();
         let mut order = vec![0; self.len()];
         for (row, stage) in self.stages.iter().enumerate() {
-            let place = &mut next[*stage as usize];
-            order[*place as usize] = row as u32;
-            *place += 1;
+            let position = &mut next[*stage as usize];
+            order[*position as usize] = row as u32;
+            *position += 1;
         }
         let mut rows = StageRows {
             stages: first,

@@ -2,7 +2,7 @@
 
 use crate::constraints::{Cone, Rows};
 use crate::qp::Subproblem;
-use crate::qp::layout::{Place, StageLayout};
+use crate::qp::layout::{StageLayout, VariableRole};
 
 /// Highest difference of a coefficient in the state.
 const HIGHEST_ORDER: usize = 3;
@@ -13,8 +13,8 @@ pub(super) struct Sizes {
     pub controls: usize,
     /// Order of the highest difference of each history.
     pub orders: Vec<usize>,
-    /// Place of each variable.
-    pub places: Vec<Place>,
+    /// VariableRole of each variable.
+    pub positions: Vec<VariableRole>,
 }
 
 impl Sizes {
@@ -23,10 +23,10 @@ impl Sizes {
         if layout.nodes < 2 {
             return None;
         }
-        let places = layout.places(sub.variables)?;
+        let positions = layout.positions(sub.variables)?;
         let mut orders = vec![1; layout.histories.len()];
         let mut reach = |stage: usize, j: usize| {
-            if let Place::History(f, node) = places[j] {
+            if let VariableRole::History(f, node) = positions[j] {
                 orders[f] = orders[f].max(node - stage);
             }
         };
@@ -37,12 +37,12 @@ impl Sizes {
             &sub.inequalities,
         ] {
             for i in 0..rows.len() {
-                let stage = stage_of(rows, i, &places);
+                let stage = stage_of(rows, i, &positions);
                 nonzero(rows, i).for_each(|j| reach(stage, j));
             }
         }
         for cone in &sub.cones {
-            let stage = stage_of_cone(cone, &places);
+            let stage = stage_of_cone(cone, &positions);
             let rows = (0..cone.rows.len()).flat_map(|i| nonzero(&cone.rows, i));
             rows.for_each(|j| reach(stage, j));
         }
@@ -53,7 +53,7 @@ impl Sizes {
             states: layout.components() + orders.iter().sum::<usize>() + layout.constants.len(),
             controls: orders.len(),
             orders,
-            places,
+            positions,
         })
     }
 }
@@ -65,20 +65,20 @@ fn nonzero(rows: &Rows, i: usize) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// The first node at which a variable of row `i` acts: constants act at all, and come into play only where there is nothing else.
-pub(super) fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
-    first_node(nonzero(rows, i), places)
+pub(super) fn stage_of(rows: &Rows, i: usize, positions: &[VariableRole]) -> usize {
+    first_node(nonzero(rows, i), positions)
 }
 
 /// The first node at which a variable of a cone acts.
-pub(super) fn stage_of_cone(cone: &Cone, places: &[Place]) -> usize {
+pub(super) fn stage_of_cone(cone: &Cone, positions: &[VariableRole]) -> usize {
     let rows = 0..cone.rows.len();
-    first_node(rows.flat_map(|i| nonzero(&cone.rows, i)), places)
+    first_node(rows.flat_map(|i| nonzero(&cone.rows, i)), positions)
 }
 
-fn first_node(variables: impl Iterator<Item = usize>, places: &[Place]) -> usize {
-    let nodes = variables.filter_map(|j| match places[j] {
-        Place::Constant(_) => None,
-        place => Some(place.node()),
+fn first_node(variables: impl Iterator<Item = usize>, positions: &[VariableRole]) -> usize {
+    let nodes = variables.filter_map(|j| match positions[j] {
+        VariableRole::Constant(_) => None,
+        position => Some(position.node()),
     });
     nodes.min().unwrap_or(0)
 }

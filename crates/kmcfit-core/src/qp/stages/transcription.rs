@@ -5,7 +5,7 @@ use super::sizes::{Sizes, stage_of, stage_of_cone};
 use super::transitions::{NONE, Transitions};
 use crate::constraints::{Rows, TOLERANCE};
 use crate::qp::Subproblem;
-use crate::qp::layout::{Place, StageLayout};
+use crate::qp::layout::{StageLayout, VariableRole};
 use crate::simd::tall_qr::order_by;
 
 /// The side of an inequality that a constraint row stands for.
@@ -45,7 +45,7 @@ pub(super) struct StageProgram<const X: usize, const W: usize> {
     pub absolute_order: Vec<usize>,
     /// Values of the first state that are known.
     pub fixed: [Option<f64>; X],
-    places: Vec<Place>,
+    positions: Vec<VariableRole>,
     /// The state of each history's value; those of its differences follow.
     values: Vec<usize>,
     orders: Vec<usize>,
@@ -102,7 +102,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             absolute_costs: Vec::new(),
             absolute_order: Vec::new(),
             fixed,
-            places: sizes.places,
+            positions: sizes.positions,
             values,
             orders: sizes.orders,
             constants,
@@ -130,8 +130,8 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
 
     /// A step of a response, solved for its later state, or a known first state.
     fn add_equality(&mut self, rows: &Rows, i: usize) -> Option<()> {
-        let later = rows.row(i).filter_map(|(j, a)| match self.places[j] {
-            Place::Response(component, node) if node > 0 && a != 0.0 => {
+        let later = rows.row(i).filter_map(|(j, a)| match self.positions[j] {
+            VariableRole::Response(component, node) if node > 0 && a != 0.0 => {
                 Some((node, component, j, a))
             }
             _ => None,
@@ -155,8 +155,8 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         }
         let mut xi = [0.0; W];
         for (j, a) in rows.row(i).filter(|(j, _)| *j != pivot) {
-            let is_at_once = match self.places[j] {
-                Place::Response(_, other) => other + 1 == node,
+            let is_at_once = match self.positions[j] {
+                VariableRole::Response(_, other) => other + 1 == node,
                 _ => true,
             };
             if !is_at_once {
@@ -172,10 +172,10 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
 
     /// The first state that is a variable.
     fn first_state(&self, variable: usize) -> Option<usize> {
-        match self.places[variable] {
-            Place::History(f, 0) => Some(self.values[f]),
-            Place::Response(component, 0) => Some(component),
-            Place::Constant(c) => Some(self.constants + c),
+        match self.positions[variable] {
+            VariableRole::History(f, 0) => Some(self.values[f]),
+            VariableRole::Response(component, 0) => Some(component),
+            VariableRole::Constant(c) => Some(self.constants + c),
             _ => None,
         }
     }
@@ -186,18 +186,18 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         if a == 0.0 {
             return Some(0.0);
         }
-        match self.places[variable] {
-            Place::Constant(c) => xi[self.constants + c] += a,
-            Place::Response(component, node) if node == i => xi[component] += a,
-            Place::Response(component, node) if node == i + 1 => {
+        match self.positions[variable] {
+            VariableRole::Constant(c) => xi[self.constants + c] += a,
+            VariableRole::Response(component, node) if node == i => xi[component] += a,
+            VariableRole::Response(component, node) if node == i + 1 => {
                 let step = i * self.transitions.responses + component;
                 for (xi, b) in xi.iter_mut().zip(&self.transitions.steps[step]) {
                     *xi += a * b;
                 }
                 return Some(a * self.offsets[step]);
             }
-            Place::Response(..) => return None,
-            Place::History(f, node) => {
+            VariableRole::Response(..) => return None,
+            VariableRole::History(f, node) => {
                 // p_{i+d} = sum_j binomial(d, j) difference_j.
                 let (d, order) = (node.checked_sub(i)?, self.orders[f]);
                 if d > order {
@@ -240,10 +240,10 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             loose.push(stage, &xi, 1.0, 0.0, |j| j == column);
         };
         for (j, d) in sub.proximal.iter().enumerate().filter(|(_, d)| **d != 0.0) {
-            match self.places[j] {
-                Place::Response(component, node) => diagonal(node, component, d.sqrt()),
-                Place::History(f, node) => diagonal(node, self.values[f], d.sqrt()),
-                Place::Constant(c) => diagonal(0, self.constants + c, d.sqrt()),
+            match self.positions[j] {
+                VariableRole::Response(component, node) => diagonal(node, component, d.sqrt()),
+                VariableRole::History(f, node) => diagonal(node, self.values[f], d.sqrt()),
+                VariableRole::Constant(c) => diagonal(0, self.constants + c, d.sqrt()),
             }
         }
         for (f, order) in self.orders.iter().enumerate() {
@@ -256,7 +256,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
     /// Adds the rows, each at its stage.
     fn add_rows(&self, rows: &Rows, loose: &mut LooseRows) -> Option<()> {
         for i in 0..rows.len() {
-            let stage = stage_of(rows, i, &self.places);
+            let stage = stage_of(rows, i, &self.positions);
             let (xi, constant) = self.row_at(stage, rows, i)?;
             loose.push(stage, &xi, 1.0, rows.right()[i] - constant, |j| {
                 xi[j] != 0.0
@@ -269,7 +269,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         let mut loose = LooseRows::default();
         let mut sides = Vec::with_capacity(sub.inequalities.len());
         for i in 0..sub.inequalities.len() {
-            let stage = stage_of(&sub.inequalities, i, &self.places);
+            let stage = stage_of(&sub.inequalities, i, &self.positions);
             let (xi, constant) = self.row_at(stage, &sub.inequalities, i)?;
             let lower = sub.inequalities.right()[i] - constant;
             let upper = sub.upper[i] - constant;
@@ -302,7 +302,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         let stages = sub
             .cones
             .iter()
-            .map(|cone| stage_of_cone(cone, &self.places));
+            .map(|cone| stage_of_cone(cone, &self.positions));
         let stages: Vec<usize> = stages.collect();
         self.cone_order = order_by(&stages);
         let mut loose = LooseRows::default();
@@ -366,10 +366,10 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
 
     /// The variables of the subproblem at the coordinates `xi`.
     pub fn variables(&self, xi: &[[f64; W]]) -> Vec<f64> {
-        let each = self.places.iter().map(|place| match *place {
-            Place::History(f, node) => xi[node][self.values[f]],
-            Place::Response(component, node) => xi[node][component],
-            Place::Constant(c) => xi[0][self.constants + c],
+        let each = self.positions.iter().map(|position| match *position {
+            VariableRole::History(f, node) => xi[node][self.values[f]],
+            VariableRole::Response(component, node) => xi[node][component],
+            VariableRole::Constant(c) => xi[0][self.constants + c],
         });
         each.collect()
     }
@@ -392,8 +392,8 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         let responses = self.transitions.responses;
         for (step, i) in self.equalities.iter().enumerate().rev() {
             if *i != NONE {
-                let place = Place::Response(step % responses, step / responses + 1);
-                solve(*i, &|j| self.places[j] == place);
+                let position = VariableRole::Response(step % responses, step / responses + 1);
+                solve(*i, &|j| self.positions[j] == position);
             }
         }
         for (state, i) in &self.fixing {

@@ -19,19 +19,19 @@ pub(crate) struct RowBlock {
 }
 
 impl RowBlock {
-    /// An empty block with `places` columns of zeros.
-    pub fn new(places: usize) -> Self {
+    /// An empty block with `positions` columns of zeros.
+    pub fn new(positions: usize) -> Self {
         Self {
             first: 0,
             count: 0,
-            begun: places,
-            columns: vec![Aligned([[0.0; LANES]; HIGH]); places + 1],
+            begun: positions,
+            columns: vec![Aligned([[0.0; LANES]; HIGH]); positions + 1],
         }
     }
 
     /// Removes all rows and sets all entries to zero.
     pub fn clear(&mut self) {
-        (self.count, self.begun) = (0, self.places());
+        (self.count, self.begun) = (0, self.positions());
         self.columns.fill(Aligned([[0.0; LANES]; HIGH]));
     }
 
@@ -69,19 +69,19 @@ impl RowBlock {
     }
 
     /// Number of columns.
-    pub fn places(&self) -> usize {
+    pub fn positions(&self) -> usize {
         self.columns.len().saturating_sub(1)
     }
 
     /// Rows of a column.
-    pub fn column(&self, place: usize) -> &[f64] {
-        &self.columns[place].as_flattened()[..self.count]
+    pub fn column(&self, position: usize) -> &[f64] {
+        &self.columns[position].as_flattened()[..self.count]
     }
 
     /// A column, with space for [`BLOCK_ROWS`] rows.
     #[inline(always)]
-    pub fn column_mut(&mut self, place: usize) -> &mut [f64; BLOCK_ROWS] {
-        let flat = self.columns[place].as_flattened_mut();
+    pub fn column_mut(&mut self, position: usize) -> &mut [f64; BLOCK_ROWS] {
+        let flat = self.columns[position].as_flattened_mut();
         flat.first_chunk_mut().expect("so many rows")
     }
 }

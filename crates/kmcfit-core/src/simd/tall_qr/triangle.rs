@@ -32,10 +32,10 @@ impl Triangle {
         }
     }
 
-    /// Triangle of `A`, the diagonal `roots` of `D`, and `d`; also returns the column of `A` for each column of `R`.
-    pub fn of(matrix: &DMatrix<f64>, roots: &[f64], right: &[f64]) -> (Self, Vec<usize>) {
+    /// Triangle of `A`, the diagonal `weight_roots` of `D`, and `d`; also returns the column of `A` for each column of `R`.
+    pub fn of(matrix: &DMatrix<f64>, weight_roots: &[f64], right: &[f64]) -> (Self, Vec<usize>) {
         Self::of_blocks(matrix, |triangle, block, rows| {
-            triangle.add_weighted(block, &roots[rows.clone()], &right[rows]);
+            triangle.add_weighted(block, &weight_roots[rows.clone()], &right[rows]);
         })
     }
 
@@ -53,9 +53,9 @@ impl Triangle {
         while block.first < height {
             let rows = block.first..(block.first + BLOCK_ROWS).min(height);
             block.count = rows.len();
-            for (place, j) in order.iter().enumerate() {
+            for (position, j) in order.iter().enumerate() {
                 let column = &columns[*j][rows.clone()];
-                block.column_mut(place)[..rows.len()].copy_from_slice(column);
+                block.column_mut(position)[..rows.len()].copy_from_slice(column);
             }
             block.first = rows.end;
             add(&mut triangle, &mut block, rows);
@@ -70,17 +70,17 @@ impl Triangle {
         });
         let mut factor = DMatrix::zeros(order.len(), order.len());
         for (i, (entries, _)) in triangle.rows().enumerate() {
-            entries.for_each(|(place, r)| factor[(i, order[place])] = r);
+            entries.for_each(|(position, r)| factor[(i, order[position])] = r);
         }
         factor
     }
 
     /// Adds the rows of a block, with `D` and `d` for each; the contents of the block are then undefined.
-    pub fn add_weighted(&mut self, block: &mut RowBlock, roots: &[f64], right: &[f64]) {
-        let places = self.begin(block);
+    pub fn add_weighted(&mut self, block: &mut RowBlock, weight_roots: &[f64], right: &[f64]) {
+        let positions = self.begin(block);
         simd::run(Weigh {
-            columns: &mut block.columns[..places],
-            roots,
+            columns: &mut block.columns[..positions],
+            weight_roots,
         });
         self.reflect(block, right);
     }
@@ -94,7 +94,7 @@ impl Triangle {
     /// Adds the columns that start in a block; returns the number of columns in use.
     fn begin(&mut self, block: &mut RowBlock) -> usize {
         let any = |part: &[f64]| part.iter().fold(false, |any, a| any | (*a != 0.0));
-        let has_begun = |place: &usize| block.column(*place).chunks(4 * LANES).any(any);
+        let has_begun = |position: &usize| block.column(*position).chunks(4 * LANES).any(any);
         let last = (self.begun..block.begun()).rev().find(has_begun);
         self.widen(last.map_or(self.begun, |last| last + 1));
         block.widen(self.begun);
@@ -150,13 +150,13 @@ impl Triangle {
         block.widen(n);
         let mut right = Vec::with_capacity(other.begun);
         for (i, (entries, b)) in other.rows().enumerate() {
-            for (place, r) in entries {
-                if place < n {
-                    block.column_mut(place)[i] += r;
+            for (position, r) in entries {
+                if position < n {
+                    block.column_mut(position)[i] += r;
                     continue;
                 }
                 for (own, state) in states.iter().take(n).enumerate() {
-                    block.column_mut(own)[i] += r * state[place - n];
+                    block.column_mut(own)[i] += r * state[position - n];
                 }
             }
             right.push(b);
@@ -169,8 +169,8 @@ impl Triangle {
     pub fn products(&self) -> Vec<f64> {
         let mut products = vec![0.0; self.rows.len()];
         for (entries, b) in self.rows() {
-            for (place, r) in entries {
-                products[place] += r * b;
+            for (position, r) in entries {
+                products[position] += r * b;
             }
         }
         products
@@ -229,10 +229,10 @@ fn begin(column: &[f64]) -> usize {
     from + more.count()
 }
 
-/// Multiplies the rows of columns by their `roots`.
+/// Multiplies the rows of columns by their `weight_roots`.
 struct Weigh<'a> {
     columns: &'a mut [BlockColumn],
-    roots: &'a [f64],
+    weight_roots: &'a [f64],
 }
 
 impl Kernel for Weigh<'_> {
@@ -240,12 +240,12 @@ impl Kernel for Weigh<'_> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
-        let (roots, last) = self.roots.as_chunks::<LANES>();
+        let (weight_roots, last) = self.weight_roots.as_chunks::<LANES>();
         for column in self.columns {
-            for (a, root) in column.iter_mut().zip(roots) {
+            for (a, root) in column.iter_mut().zip(weight_roots) {
                 *a = (Eight::load(arithmetic, root) * Eight::load(arithmetic, a)).row();
             }
-            let rest = column.get_mut(roots.len()).into_iter().flatten();
+            let rest = column.get_mut(weight_roots.len()).into_iter().flatten();
             rest.zip(last).for_each(|(a, root)| *a *= root);
         }
     }
@@ -382,24 +382,24 @@ mod tests {
             false => ((i * (j + 2)) as f64 * 0.7 + j as f64).sin(),
         };
         let matrix = DMatrix::from_fn(ROWS, begins.len(), entry);
-        let roots = (0..ROWS).map(|i| 1.0 + (i as f64).cos().abs()).collect();
+        let weight_roots = (0..ROWS).map(|i| 1.0 + (i as f64).cos().abs()).collect();
         let right = (0..ROWS).map(|i| (0.3 * i as f64).cos()).collect();
-        (matrix, roots, right)
+        (matrix, weight_roots, right)
     }
 
     #[test]
     fn the_triangle_has_the_minimum_of_the_tall_matrix() {
-        let (matrix, roots, right) = problem();
-        let (triangle, order) = Triangle::of(&matrix, &roots, &right);
+        let (matrix, weight_roots, right) = problem();
+        let (triangle, order) = Triangle::of(&matrix, &weight_roots, &right);
         assert_eq!(order, [1, 3, 2, 4, 0]);
-        let weights = DMatrix::from_diagonal(&DVector::from_vec(roots));
+        let weights = DMatrix::from_diagonal(&DVector::from_vec(weight_roots));
         let (weighted, right) = (weights * matrix, DVector::from_vec(right));
         let svd = weighted.clone().svd(true, true);
         let expected = svd.solve(&right, 0.0).expect("five independent columns");
         let found = triangle.solve(1e-14).expect("five independent columns");
-        for (place, j) in order.iter().enumerate() {
+        for (position, j) in order.iter().enumerate() {
             assert!(
-                (found[place] - expected[*j]).abs() <= 1e-13,
+                (found[position] - expected[*j]).abs() <= 1e-13,
                 "{found:?} {expected}"
             );
         }
@@ -411,10 +411,10 @@ mod tests {
     /// A right-hand side given by its products and its square; inconsistent values are rejected.
     #[test]
     fn another_right_hand_side_of_the_same_matrix_is_reduced() {
-        let (matrix, roots, right) = problem();
+        let (matrix, weight_roots, right) = problem();
         let other: Vec<f64> = right.iter().map(|x| x * x - 0.3).collect();
-        let (expected, order) = Triangle::of(&matrix, &roots, &other);
-        let (triangle, _) = Triangle::of(&matrix, &roots, &right);
+        let (expected, order) = Triangle::of(&matrix, &weight_roots, &other);
+        let (triangle, _) = Triangle::of(&matrix, &weight_roots, &right);
         let square: f64 = other.iter().map(|x| x * x).sum();
         let found = (triangle.clone().beside(&expected.products(), square)).expect("such a side");
         let pairs = |t: &Triangle| t.solve(1e-14).expect("five independent columns");
@@ -430,8 +430,8 @@ mod tests {
     /// Every division of the rows into blocks gives the same result, to machine precision.
     #[test]
     fn the_result_does_not_depend_on_the_blocks() {
-        let (matrix, roots, right) = problem();
-        let (whole, order) = Triangle::of(&matrix, &roots, &right);
+        let (matrix, weight_roots, right) = problem();
+        let (whole, order) = Triangle::of(&matrix, &weight_roots, &right);
         let mut parts = Triangle::new(order.len());
         let mut block = RowBlock::new(order.len());
         let mut first = 0;
@@ -439,12 +439,16 @@ mod tests {
             let rows = first..(first + count).min(ROWS);
             block.clear();
             block.count = rows.len();
-            for (place, j) in order.iter().enumerate() {
+            for (position, j) in order.iter().enumerate() {
                 for (r, i) in rows.clone().enumerate() {
-                    block.column_mut(place)[r] = matrix[(i, *j)];
+                    block.column_mut(position)[r] = matrix[(i, *j)];
                 }
             }
-            parts.add_weighted(&mut block, &roots[rows.clone()], &right[rows.clone()]);
+            parts.add_weighted(
+                &mut block,
+                &weight_roots[rows.clone()],
+                &right[rows.clone()],
+            );
             first = rows.end;
         }
         assert_eq!(first, ROWS);
@@ -460,14 +464,20 @@ mod tests {
 
     #[test]
     fn undetermined_columns_have_no_solution() {
-        let (mut matrix, roots, right) = problem();
+        let (mut matrix, weight_roots, right) = problem();
         let sum = matrix.column(1) + matrix.column(3);
         matrix.set_column(2, &sum);
-        assert_eq!(Triangle::of(&matrix, &roots, &right).0.solve(1e-14), None);
+        assert_eq!(
+            Triangle::of(&matrix, &weight_roots, &right).0.solve(1e-14),
+            None
+        );
         matrix.column_mut(2).fill(0.0);
-        assert_eq!(Triangle::of(&matrix, &roots, &right).0.solve(1e-14), None);
+        assert_eq!(
+            Triangle::of(&matrix, &weight_roots, &right).0.solve(1e-14),
+            None
+        );
         matrix[(7, 2)] = f64::NAN;
-        let (triangle, _) = Triangle::of(&matrix, &roots, &right);
+        let (triangle, _) = Triangle::of(&matrix, &weight_roots, &right);
         assert!(!triangle.is_finite());
         assert_eq!(triangle.solve(1e-14), None);
     }

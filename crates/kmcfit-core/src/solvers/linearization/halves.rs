@@ -52,12 +52,12 @@ impl Half {
     }
 
     fn of(problem: &Problem, evaluation: &Evaluation, steps: Range<usize>, columns: usize) -> Self {
-        let order = problem.places();
+        let order = problem.positions();
         let mut triangle = Triangle::new(columns);
         let mut residuals = Residuals::with_capacity(BLOCK_ROWS);
         let states = problem.each_row_block_of_part(evaluation, &order, steps, |mut block| {
             residuals.set_block(problem, evaluation, &block);
-            triangle.add_weighted(&mut block, &residuals.roots, &residuals.weighted);
+            triangle.add_weighted(&mut block, &residuals.weight_roots, &residuals.weighted);
             block
         });
         Self {

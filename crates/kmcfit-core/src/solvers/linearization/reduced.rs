@@ -31,8 +31,11 @@ impl Reduced {
 
     /// Reduction of the whole Jacobian of the predictions.
     pub(super) fn of(jacobian: &DMatrix<f64>, residuals: &Residuals) -> Self {
-        let Residuals { roots, weighted } = residuals;
-        let (triangle, order) = Triangle::of(jacobian, roots, weighted);
+        let Residuals {
+            weight_roots,
+            weighted,
+        } = residuals;
+        let (triangle, order) = Triangle::of(jacobian, weight_roots, weighted);
         Self { triangle, order }
     }
 
@@ -43,14 +46,17 @@ impl Reduced {
         timings: &mut Timings,
     ) -> Self {
         let clock = Instant::now();
-        let order = problem.places();
+        let order = problem.positions();
         let mut residuals = Residuals::with_capacity(BLOCK_ROWS);
         let mut triangle = Triangle::new(order.len());
         let mut reducing = Duration::ZERO;
         problem.each_row_block(evaluation, &order, |mut block| {
             residuals.set_block(problem, evaluation, &block);
-            let Residuals { roots, weighted } = &residuals;
-            let mut add = || triangle.add_weighted(&mut block, roots, weighted);
+            let Residuals {
+                weight_roots,
+                weighted,
+            } = &residuals;
+            let mut add = || triangle.add_weighted(&mut block, weight_roots, weighted);
             match order.len() > NARROW {
                 true => timed(&mut reducing, add),
                 false => add(),
@@ -86,7 +92,7 @@ impl Reduced {
     pub(super) fn subproblem(&self) -> Subproblem {
         let mut sub = empty(self.order.len());
         for (entries, b) in self.triangle.rows() {
-            let entries = entries.map(|(place, r)| (self.order[place], r));
+            let entries = entries.map(|(position, r)| (self.order[position], r));
             sub.residuals.push(entries, -b);
         }
         sub.residuals.push([], self.triangle.rest());
@@ -98,7 +104,7 @@ impl Reduced {
         let n = self.order.len();
         let (mut matrix, mut right) = (DMatrix::zeros(n + 1, n), DVector::zeros(n + 1));
         for (i, (entries, b)) in self.triangle.rows().enumerate() {
-            entries.for_each(|(place, r)| matrix[(i, self.order[place])] = r);
+            entries.for_each(|(position, r)| matrix[(i, self.order[position])] = r);
             right[i] = b;
         }
         right[n] = self.triangle.rest();
@@ -134,12 +140,15 @@ pub(super) fn of_whole_jacobian(
         problem.whitened_jacobian(evaluation)
     });
     timed(&mut timings.linear_algebra, || {
-        let Residuals { roots, weighted } = &residuals;
+        let Residuals {
+            weight_roots,
+            weighted,
+        } = &residuals;
         if jacobian.nrows() > jacobian.ncols() {
             return Reduced::of(&jacobian, &residuals).subproblem();
         }
         let mut sub = empty(jacobian.ncols());
-        for ((row, root), r) in jacobian.row_iter().zip(roots).zip(weighted) {
+        for ((row, root), r) in jacobian.row_iter().zip(weight_roots).zip(weighted) {
             let entries = row.iter().map(|a| root * a).enumerate();
             sub.residuals.push(entries.filter(|(_, a)| *a != 0.0), -r);
         }
@@ -152,10 +161,10 @@ pub(super) fn of_whole_jacobian(
 /// Weighted Jacobian `sqrt(w) dz/dtheta` (samples x parameters) for the predictions `z` of all channels, whitened where the
 /// noise is correlated.
 pub fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
-    let Residuals { roots, .. } = Residuals::at(problem, evaluation);
+    let Residuals { weight_roots, .. } = Residuals::at(problem, evaluation);
     let mut jacobian = problem.whitened_jacobian(evaluation);
     for mut column in jacobian.column_iter_mut() {
-        (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
+        (column.iter_mut().zip(&weight_roots)).for_each(|(a, root)| *a *= root);
     }
     jacobian
 }

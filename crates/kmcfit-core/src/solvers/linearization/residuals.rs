@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Weighted residuals of the samples of all channels.
 pub(super) struct Residuals {
     /// Roots of the weights, `sqrt(w)`; for correlated noise those of the whitened residuals.
-    pub roots: Vec<f64>,
+    pub weight_roots: Vec<f64>,
     /// Weighted residuals, `sqrt(w) r`.
     pub weighted: Vec<f64>,
 }
@@ -26,14 +26,14 @@ impl Residuals {
 
     pub fn with_capacity(samples: usize) -> Self {
         Self {
-            roots: Vec::with_capacity(samples),
+            weight_roots: Vec::with_capacity(samples),
             weighted: Vec::with_capacity(samples),
         }
     }
 
     /// Replaces the residuals by those of a block of rows of the Jacobian, which belong to one channel.
     pub fn set_block(&mut self, problem: &Problem, evaluation: &Evaluation, block: &RowBlock) {
-        self.roots.clear();
+        self.weight_roots.clear();
         self.weighted.clear();
         let mut first = block.first;
         for (channel, predicted) in problem.predicted(evaluation) {
@@ -46,31 +46,34 @@ impl Residuals {
 
     /// Appends some samples of a channel, all of them for correlated noise.
     pub fn push(&mut self, channel: &Channel, predicted: &[f64], samples: Range<usize>) {
-        let Self { roots, weighted } = self;
+        let Self {
+            weight_roots,
+            weighted,
+        } = self;
         if channel.correlation().is_some() {
             assert_eq!(samples, 0..channel.len(), "whitening needs all samples");
             let majorant = channel.majorant(predicted);
-            roots.extend(majorant.roots);
+            weight_roots.extend(majorant.weight_roots);
             weighted.extend(majorant.weighted);
             return;
         }
-        let first = roots.len();
+        let first = weight_roots.len();
         let residuals = || channel.residuals_of(predicted, samples.clone());
         match channel.uniform_weights() {
             Some([inner, ends]) => {
-                roots.resize(first + samples.len(), inner.sqrt());
+                weight_roots.resize(first + samples.len(), inner.sqrt());
                 for end in [0, channel.len() - 1] {
                     if samples.contains(&end) {
-                        roots[first + end - samples.start] = ends.sqrt();
+                        weight_roots[first + end - samples.start] = ends.sqrt();
                     }
                 }
             }
             None => {
                 let each = samples.clone().zip(residuals());
-                roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
+                weight_roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
             }
         }
-        let pairs = residuals().zip(&roots[first..]);
+        let pairs = residuals().zip(&weight_roots[first..]);
         weighted.extend(pairs.map(|(r, root)| root * r));
     }
 }
@@ -101,6 +104,6 @@ mod tests {
             parts.push(&channel, &predicted, samples);
         }
         assert_eq!(parts.weighted, whole.weighted);
-        assert_eq!(parts.roots, whole.roots);
+        assert_eq!(parts.weight_roots, whole.weight_roots);
     }
 }

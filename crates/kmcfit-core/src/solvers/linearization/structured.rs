@@ -44,8 +44,8 @@ pub fn subproblem(
     sub.elimination_order = problem.functions.first_nodes();
     for (experiment, count) in records() {
         let nodes = 1..experiment.nodes as u32;
-        let places = nodes.flat_map(|i| std::iter::repeat_n(i, *count));
-        sub.elimination_order.extend(places);
+        let positions = nodes.flat_map(|i| std::iter::repeat_n(i, *count));
+        sub.elimination_order.extend(positions);
     }
     sub.layout = layout(problem, &components);
     let mut base = parameters;
@@ -140,10 +140,10 @@ impl UnknownColumns<'_> {
     ) {
         let functions = &self.problem.functions;
         let set = functions.coefficient_set(self.experiment.coefficient_set);
-        for (place, f) in set.parts() {
+        for (position, f) in set.parts() {
             let (function, range) = (functions.get(f), &functions.ranges()[f]);
             for side in 0..2 {
-                let slope = slope(place, side);
+                let slope = slope(position, side);
                 if slope != 0.0 {
                     let add = |(j, b): (usize, f64)| entries.push((range.start + j, slope * b));
                     function.design.row(i + side).for_each(add);
@@ -177,8 +177,8 @@ impl UnknownColumns<'_> {
         let coordinate = plain.then(|| channel.coordinate()).flatten();
         let mut samples = (!view.system.structure.is_one()).then(|| RowSamples::new(channel, view));
         let mut row = |i: usize, entries: &mut Vec<(usize, f64)>| {
-            let place = channel.place(view, i);
-            if let (Some(j), Some(node)) = (coordinate, place.as_node()) {
+            let position = channel.position(view, i);
+            if let (Some(j), Some(node)) = (coordinate, position.as_node()) {
                 entries.extend(self.state(node, j).map(|index| (index, gain)));
                 return;
             }
@@ -188,34 +188,37 @@ impl UnknownColumns<'_> {
                 let sensed = samples.observe(i);
                 for (side, by) in sensed.states.iter().enumerate() {
                     for (q, slope) in by.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
-                        let index = self.state(place.step + side, q);
+                        let index = self.state(position.step + side, q);
                         entries.extend(index.map(|index| (index, gain * slope)));
                     }
                 }
                 let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
-                self.add_function_slopes(place.step, &slope, entries);
+                self.add_function_slopes(position.step, &slope, entries);
                 self.add_sensor(channel, factors, entries);
                 return;
             }
             let sensed = channel.sensed(view, i);
             for (j, slope) in sensed.states.iter().enumerate() {
                 if *slope != 0.0 {
-                    let index = self.state(place.step + j / 2, j % 2);
+                    let index = self.state(position.step + j / 2, j % 2);
                     entries.extend(index.map(|index| (index, gain * slope)));
                 }
             }
             let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
-            self.add_function_slopes(place.step, &slope, entries);
+            self.add_function_slopes(position.step, &slope, entries);
             self.add_sensor(
                 channel,
                 channel.sensor_factors(view, i, sensed.value),
                 entries,
             );
         };
-        let Majorant { roots, weighted } = channel.majorant(predicted);
+        let Majorant {
+            weight_roots,
+            weighted,
+        } = channel.majorant(predicted);
         if channel.filter().is_empty() && channel.correlation().is_none() {
             let mut entries = Vec::new();
-            for (i, (root, r)) in roots.iter().zip(&weighted).enumerate() {
+            for (i, (root, r)) in weight_roots.iter().zip(&weighted).enumerate() {
                 entries.clear();
                 row(i, &mut entries);
                 let row = entries.iter().map(|(j, a)| (*j, root * a));
@@ -237,7 +240,7 @@ impl UnknownColumns<'_> {
             sub.layout = None;
             rows = whitened(correlation, channel.weighting(), &rows);
         }
-        for (row, (root, r)) in rows.iter().zip(roots.iter().zip(&weighted)) {
+        for (row, (root, r)) in rows.iter().zip(weight_roots.iter().zip(&weighted)) {
             sub.residuals
                 .push(row.iter().map(|(j, a)| (*j, root * a)), -r);
         }

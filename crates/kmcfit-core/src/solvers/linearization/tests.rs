@@ -160,7 +160,7 @@ fn the_jacobian_is_reused_after_short_steps() {
     let mut timings = Timings::default();
     let reduced = reduce(&problem, &fit.best.evaluation, &mut timings);
     let step = reduced.solution().expect("independent columns");
-    let order = problem.places();
+    let order = problem.positions();
     // What the last step, with a Jacobian computed before, has left: less than the tolerance of the cost.
     let mut minimum = theta.clone();
     (step.iter().zip(order)).for_each(|(step, j)| minimum[j] += step);

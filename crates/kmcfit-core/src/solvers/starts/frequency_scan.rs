@@ -155,17 +155,22 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
             .collect::<Vec<usize>>()
     };
     let (masses, springs) = ((0..inertias).collect::<Vec<_>>(), of_law(Law::Stiffness));
-    let average = |levels: &[f64], places: &[usize]| {
-        places.iter().map(|p| levels[*p]).sum::<f64>() / places.len() as f64
+    let average = |levels: &[f64], positions: &[usize]| {
+        positions.iter().map(|p| levels[*p]).sum::<f64>() / positions.len() as f64
     };
     let mass = average(&levels, &masses);
-    for place in &springs {
-        if levels[*place] <= 0.0 {
-            levels[*place] = mass;
+    for position in &springs {
+        if levels[*position] <= 0.0 {
+            levels[*position] = mass;
         }
     }
-    let parameter = |place: &usize| Some((*place, functions.ranges()[set[*place]].clone().next()?));
-    let free = |places: &[usize]| places.iter().filter_map(parameter).collect::<Vec<_>>();
+    let parameter = |position: &usize| {
+        Some((
+            *position,
+            functions.ranges()[set[*position]].clone().next()?,
+        ))
+    };
+    let free = |positions: &[usize]| positions.iter().filter_map(parameter).collect::<Vec<_>>();
     let (free_masses, free_springs) = (free(&masses), free(&springs));
     let lowest = |levels: &[f64]| structure.eigenvalues(levels)?.first().copied();
     let from_square = lowest(&levels).filter(|square| *square > 0.0)?;
@@ -178,8 +183,8 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
             (false, true) => [1.0 / ratio, 1.0],
             (true, _) => [1.0, ratio],
         };
-        (free_masses.iter()).for_each(|(place, i)| theta[*i] = levels[*place] * to_mass);
-        (free_springs.iter()).for_each(|(place, i)| theta[*i] = levels[*place] * to_spring);
+        (free_masses.iter()).for_each(|(position, i)| theta[*i] = levels[*position] * to_mass);
+        (free_springs.iter()).for_each(|(position, i)| theta[*i] = levels[*position] * to_spring);
         let critical = (mass * to_mass * average(&levels, &springs) * to_spring).sqrt();
         for (_, i) in free(&of_law(Law::Damping)) {
             theta[i] = theta[i].max(2.0 * LEAST_DAMPING_RATIO * critical);
@@ -189,7 +194,7 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
     let frequency = |theta: &[f64]| {
         let mut levels = levels.clone();
         let each = free_masses.iter().chain(&free_springs);
-        each.for_each(|(place, i)| levels[*place] = theta[*i]);
+        each.for_each(|(position, i)| levels[*position] = theta[*i]);
         lowest(&levels).unwrap_or(f64::NAN).sqrt()
     };
     let starts: Vec<Vec<f64>> = frequencies(problem)?.into_iter().map(from).collect();

@@ -196,11 +196,11 @@ impl Equations {
         let mut program = Subproblem::new(nodes);
         program.elimination_order = (0..nodes as u32).collect();
         for plain in channels {
-            let places = plain.channel.places();
-            let inside = places.take_while(|place| place.step + 1 < nodes);
-            for (i, (place, value)) in inside.zip(&plain.values).enumerate() {
-                let x = place.step as f64 + place.fraction;
-                let first = first_point(place, nodes);
+            let positions = plain.channel.positions();
+            let inside = positions.take_while(|position| position.step + 1 < nodes);
+            for (i, (position, value)) in inside.zip(&plain.values).enumerate() {
+                let x = position.step as f64 + position.fraction;
+                let first = first_point(position, nodes);
                 let weight = 1.0 / plain.noise_at(i);
                 let row = &differences(x, first, step)[plain.order()];
                 let row = row.iter().enumerate().map(|(j, w)| (first + j, weight * w));
@@ -279,8 +279,8 @@ impl Plain<'_> {
     }
 }
 
-fn first_point(place: TimePoint, nodes: usize) -> usize {
-    let nearest = place.step + usize::from(place.fraction > 0.5);
+fn first_point(position: TimePoint, nodes: usize) -> usize {
+    let nearest = position.step + usize::from(position.fraction > 0.5);
     nearest.saturating_sub(POINTS / 2).min(nodes - POINTS)
 }
 

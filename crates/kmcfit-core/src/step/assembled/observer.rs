@@ -53,26 +53,26 @@ impl<'a> RowObserver<'a> {
         }
     }
 
-    /// The combination `row` of displacements, velocities or accelerations at `place`; supports move as the excitation says, accelerations are
+    /// The combination `row` of displacements, velocities or accelerations at `position`; supports move as the excitation says, accelerations are
     /// relative to the frames.
     ///
     /// # Panics
-    /// If `place` is not within the response.
-    pub fn value(&mut self, kind: ChannelKind, row: &Ends, place: TimePoint) -> f64 {
+    /// If `position` is not within the response.
+    pub fn value(&mut self, kind: ChannelKind, row: &Ends, position: TimePoint) -> f64 {
         let n = self.states.coordinates();
         if kind == ChannelKind::Acceleration {
-            self.solve(place);
+            self.solve(position);
             return row.across(&self.stage.a);
         }
-        let of_supports = self.of_supports(kind, row, place);
+        let of_supports = self.of_supports(kind, row, position);
         let velocities = match kind {
             ChannelKind::Displacement => Vec::new(),
-            _ => self.velocities(place),
+            _ => self.velocities(position),
         };
         let entries = row.entries().iter().filter(|(j, _)| *j < n);
         let terms = entries.map(|(j, factor)| {
             let of_coordinate = velocities.get(*j).copied();
-            factor * of_coordinate.unwrap_or_else(|| self.displacement(*j, place))
+            factor * of_coordinate.unwrap_or_else(|| self.displacement(*j, position))
         });
         of_supports + terms.sum::<f64>()
     }
@@ -81,24 +81,29 @@ impl<'a> RowObserver<'a> {
     ///
     /// # Panics
     /// As [`RowObserver::value`].
-    pub fn observe(&mut self, kind: ChannelKind, row: &Ends, place: TimePoint) -> &RowObservation {
-        let value = self.value(kind, row, place);
+    pub fn observe(
+        &mut self,
+        kind: ChannelKind,
+        row: &Ends,
+        position: TimePoint,
+    ) -> &RowObservation {
+        let value = self.value(kind, row, position);
         let lists = self.out.states.iter_mut().chain(&mut self.out.functions);
         lists.for_each(|list| list.fill(0.0));
         let mut weights = vec![0.0; self.states.coordinates()];
         row.spread(1.0, &mut weights);
         match kind {
-            ChannelKind::Displacement => self.add_displacement(&weights, place),
-            ChannelKind::Velocity => self.add_velocity(&weights, place),
-            ChannelKind::Acceleration => self.add_acceleration(&weights, place),
+            ChannelKind::Displacement => self.add_displacement(&weights, position),
+            ChannelKind::Velocity => self.add_velocity(&weights, position),
+            ChannelKind::Acceleration => self.add_acceleration(&weights, position),
         }
         self.out.value = value;
         &self.out
     }
 
-    /// Derivatives of the accelerations of `row` at `place` by the force on each coordinate, and by the acceleration of each frame.
-    pub fn acceleration_by_inputs(&mut self, row: &Ends, place: TimePoint) -> [Vec<f64>; 2] {
-        self.solve(place);
+    /// Derivatives of the accelerations of `row` at `position` by the force on each coordinate, and by the acceleration of each frame.
+    pub fn acceleration_by_inputs(&mut self, row: &Ends, position: TimePoint) -> [Vec<f64>; 2] {
+        self.solve(position);
         let mut weights = vec![0.0; self.states.coordinates()];
         row.spread(1.0, &mut weights);
         self.pull(&weights);
@@ -122,7 +127,7 @@ impl<'a> RowObserver<'a> {
         by
     }
 
-    fn of_supports(&self, kind: ChannelKind, row: &Ends, place: TimePoint) -> f64 {
+    fn of_supports(&self, kind: ChannelKind, row: &Ends, position: TimePoint) -> f64 {
         let n = self.states.coordinates();
         let supports = self.driven.excitation.map_or(&[][..], |e| &e.supports);
         let of = |(j, factor): &(usize, f64)| {
@@ -130,8 +135,8 @@ impl<'a> RowObserver<'a> {
             Some(
                 factor
                     * match kind {
-                        ChannelKind::Displacement => support.displacement.at(place),
-                        _ => support.velocity.at(place),
+                        ChannelKind::Displacement => support.displacement.at(position),
+                        _ => support.velocity.at(position),
                     },
             )
         };
@@ -151,17 +156,20 @@ impl<'a> RowObserver<'a> {
         }
     }
 
-    fn velocities(&mut self, place: TimePoint) -> Vec<f64> {
-        let (states, i) = (self.states, place.step);
+    fn velocities(&mut self, position: TimePoint) -> Vec<f64> {
+        let (states, i) = (self.states, position.step);
         let n = states.coordinates();
         let at_node = |node: usize| (0..n).map(move |j| states.velocity(j)[node]);
-        match place.fraction {
+        match position.fraction {
             0.0 => at_node(i).collect(),
             1.0 => at_node(i + 1).collect(),
             x => {
                 let by = hermite(x, self.driven.system.grid.step());
                 let mut accelerations = |fraction: f64| {
-                    self.solve(TimePoint { fraction, ..place });
+                    self.solve(TimePoint {
+                        fraction,
+                        ..position
+                    });
                     self.stage.a.clone()
                 };
                 let [left, right] = [0.0, 1.0].map(&mut accelerations);
@@ -175,12 +183,12 @@ impl<'a> RowObserver<'a> {
         }
     }
 
-    /// Solves the equation of motion at `place`.
-    fn solve(&mut self, place: TimePoint) {
+    /// Solves the equation of motion at `position`.
+    fn solve(&mut self, position: TimePoint) {
         let n = self.states.coordinates();
-        let q: Vec<f64> = (0..n).map(|j| self.displacement(j, place)).collect();
-        let v = self.velocities(place);
-        let (i, x) = (place.step, place.fraction);
+        let q: Vec<f64> = (0..n).map(|j| self.displacement(j, position)).collect();
+        let v = self.velocities(position);
+        let (i, x) = (position.step, position.fraction);
         let values = &mut self.stage.values;
         for (to, f) in values.functions.iter_mut().zip(&self.functions) {
             *to = match x {
@@ -191,15 +199,15 @@ impl<'a> RowObserver<'a> {
         }
         if let Some(excitation) = self.driven.excitation {
             let set = |to: &mut [f64], inputs: &[(usize, StageSamples)]| {
-                (inputs.iter()).for_each(|(j, samples)| to[*j] = samples.at(place));
+                (inputs.iter()).for_each(|(j, samples)| to[*j] = samples.at(position));
             };
             set(&mut values.forces, &excitation.forces);
             set(&mut values.frames, &excitation.frames);
             let [of_q, of_v, of_a] = &mut values.supports;
             for (s, support) in excitation.supports.iter().enumerate() {
-                of_q[s] = support.displacement.at(place);
-                of_v[s] = support.velocity.at(place);
-                of_a[s] = support.acceleration.at(place);
+                of_q[s] = support.displacement.at(position);
+                of_v[s] = support.velocity.at(position);
+                of_a[s] = support.acceleration.at(position);
             }
         }
         let structure = &self.driven.system.structure;
@@ -219,9 +227,9 @@ impl<'a> RowObserver<'a> {
     }
 
     /// Adds the derivatives of the displacements with some weights.
-    fn add_displacement(&mut self, weights: &[f64], place: TimePoint) {
+    fn add_displacement(&mut self, weights: &[f64], position: TimePoint) {
         let n = weights.len();
-        let by = hermite(place.fraction, self.driven.system.grid.step());
+        let by = hermite(position.fraction, self.driven.system.grid.step());
         for (j, weight) in weights.iter().enumerate() {
             for side in 0..2 {
                 self.out.states[side][j] += weight * by[2 * side];
@@ -230,9 +238,9 @@ impl<'a> RowObserver<'a> {
         }
     }
 
-    fn add_velocity(&mut self, weights: &[f64], place: TimePoint) {
+    fn add_velocity(&mut self, weights: &[f64], position: TimePoint) {
         let n = weights.len();
-        let x = place.fraction;
+        let x = position.fraction;
         let by = hermite(x, self.driven.system.grid.step());
         for side in 0..2 {
             for (j, weight) in weights.iter().enumerate() {
@@ -241,15 +249,21 @@ impl<'a> RowObserver<'a> {
             if by[2 * side + 1] != 0.0 {
                 let weights: Vec<f64> = weights.iter().map(|w| w * by[2 * side + 1]).collect();
                 let fraction = side as f64;
-                self.add_acceleration(&weights, TimePoint { fraction, ..place });
+                self.add_acceleration(
+                    &weights,
+                    TimePoint {
+                        fraction,
+                        ..position
+                    },
+                );
             }
         }
     }
 
-    fn add_acceleration(&mut self, weights: &[f64], place: TimePoint) {
-        self.solve(place);
+    fn add_acceleration(&mut self, weights: &[f64], position: TimePoint) {
+        self.solve(position);
         let [by_q, by_v, by_z] = self.pull(weights);
-        for (side, share) in [1.0 - place.fraction, place.fraction]
+        for (side, share) in [1.0 - position.fraction, position.fraction]
             .into_iter()
             .enumerate()
         {
@@ -261,7 +275,7 @@ impl<'a> RowObserver<'a> {
             let pairs = internal.zip(&by_z);
             pairs.for_each(|(to, by)| *to += share * by);
         }
-        self.add_displacement(&by_q, place);
-        self.add_velocity(&by_v, place);
+        self.add_displacement(&by_q, position);
+        self.add_velocity(&by_v, position);
     }
 }

@@ -156,14 +156,14 @@ impl<T: Scalar> AssembledStage<T> {
         }
         match h == 0.0 || structure.is_linear() {
             true => {
-                self.place(n, h, q, v);
+                self.position(n, h, q, v);
                 self.settle(structure, h, z)?;
                 self.residual(structure);
                 self.newton_step(structure, h)?;
             }
             false => self.iterate(structure, h, [q, v, z])?,
         }
-        self.place(n, h, q, v);
+        self.position(n, h, q, v);
         self.settle(structure, h, z)
     }
 
@@ -178,7 +178,7 @@ impl<T: Scalar> AssembledStage<T> {
         let size = |x: &[T]| x.iter().map(|x| x.value().abs()).fold(0.0, f64::max);
         let (mut norm, mut length, mut further) = (f64::INFINITY, 1.0, T::FURTHER);
         for _ in 0..ITERATIONS {
-            self.place(n, h, q, v);
+            self.position(n, h, q, v);
             self.settle(structure, h, z)?;
             self.residual(structure);
             let now = size(&self.work);
@@ -226,7 +226,7 @@ impl<T: Scalar> AssembledStage<T> {
         self.place_supports(n);
         let each = self.a[..n].iter_mut().zip(accelerations);
         each.for_each(|(to, a)| *to = a);
-        self.place(n, h, q, v);
+        self.position(n, h, q, v);
         self.settle(structure, h, z)
     }
 
@@ -238,7 +238,7 @@ impl<T: Scalar> AssembledStage<T> {
     }
 
     /// Displacements and velocities at the stage.
-    fn place(&mut self, n: usize, h: f64, q: &[T], v: &[T]) {
+    fn position(&mut self, n: usize, h: f64, q: &[T], v: &[T]) {
         for j in 0..n {
             (self.q[j], self.v[j]) = match h == 0.0 {
                 true => (q[j], v[j]),

@@ -115,11 +115,11 @@ pub fn starts(problem: &Problem, how: &Multistart) -> Vec<Vec<f64>> {
         for i in (1..cells.len()).rev() {
             cells.swap(i, random.random_range(0..=i));
         }
-        let place = |cell: usize| {
+        let position = |cell: usize| {
             let share = (cell as f64 + random.random_range(0.0..1.0)) / how.starts as f64;
             low + share * (high - low)
         };
-        columns.push(cells.into_iter().map(place).collect::<Vec<f64>>());
+        columns.push(cells.into_iter().map(position).collect::<Vec<f64>>());
     }
     let drawn = (0..how.starts).map(|i| columns.iter().map(|c| c[i]).collect::<Vec<f64>>());
     match &how.ranges {

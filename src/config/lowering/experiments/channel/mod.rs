@@ -7,7 +7,7 @@ use super::column_samples::{self, ColumnRequest, ColumnSamples, PresentRows};
 use super::data_facts::RecordNotes;
 use super::faults::{Column, is_coarse, quantisation_step};
 use super::{ChannelNote, names};
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::config::lowering::experiments::Entry;
 use crate::error::InputError;
 use crate::number_format::{count, significant};
@@ -263,7 +263,7 @@ fn read_one(
 
 /// Refuses too few samples, and samples that are all equal; `samples` are those of `source` that are not missing.
 fn refuse_too_little(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     kind: ChannelKind,
     source: &ColumnSamples,
     samples: &[f64],

@@ -2,7 +2,7 @@
 
 use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::number_format::significant;
 use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
@@ -18,7 +18,7 @@ const STUDENT: f64 = 4.0;
 const FIRST_SIGMA: f64 = 0.05;
 
 pub(super) fn weighting(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     sigma: Option<&SigmaValue>,
     sigmas: Option<Vec<f64>>,
     values: &[f64],
@@ -76,7 +76,7 @@ pub(super) fn with_quantisation(
     }
 }
 
-pub(super) fn loss(at: &Place<'_>, of_kind: &Spec) -> Result<Loss, InputError> {
+pub(super) fn loss(at: &ModelKey<'_>, of_kind: &Spec) -> Result<Loss, InputError> {
     let at = at.below(&format!("loss.{}", of_kind.kind.name()));
     let (name, threshold, degrees) = match of_kind.loss {
         None => return Ok(Loss::Squares),

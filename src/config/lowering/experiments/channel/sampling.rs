@@ -1,7 +1,7 @@
 //! Sampling of a channel: equal spacing, decimation, and the band-pass filter.
 
 use super::super::column_samples;
-use crate::config::lowering::Place;
+use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::number_format::count;
 use kmcfit_core::internals::signal::even_spacing;
@@ -13,7 +13,7 @@ const BAND_ORDER: usize = 2;
 
 /// Keeps every `factor`-th sample after a low-pass filter.
 pub(super) fn decimate(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     factor: usize,
     source: &mut column_samples::ColumnSamples,
     ignored: &mut Vec<(usize, String)>,
@@ -50,7 +50,7 @@ pub(super) fn decimate(
 
 /// The filter of the band.
 pub(super) fn band(
-    at: &Place<'_>,
+    at: &ModelKey<'_>,
     spec: &ExperimentSpec,
     spacing: Option<f64>,
     missing: usize,

@@ -24,7 +24,7 @@ pub(super) fn bumps(
     let half = (widest * 0.5f64.powi(halvings)).max(quiet.min(widest));
     let samples = (half / measured.weight).round() as usize;
     let runs = measured.runs(problem.system.grid.step());
-    Bumps::of(&runs, samples.clamp(1, measured.places.len()))
+    Bumps::of(&runs, samples.clamp(1, measured.positions.len()))
 }
 
 /// Largest and smallest half length of the bump functions of a record, s. The largest is 0.35 periods of the acceleration, whose

@@ -18,7 +18,7 @@ pub(super) struct DenseRows {
     pub rows: DMatrix<f64>,
     pub residuals: DVector<f64>,
     /// Root of the weight of each row.
-    pub roots: Vec<f64>,
+    pub weight_roots: Vec<f64>,
     /// Rows of each record, in time order.
     pub records: Vec<Range<usize>>,
 }
@@ -26,14 +26,14 @@ pub(super) struct DenseRows {
 impl DenseRows {
     pub fn of(problem: &Problem, equations: &Equations, theta: &[f64]) -> Self {
         let mut sub = Subproblem::new(problem.parameters());
-        let (mut records, mut roots) = (Vec::new(), Vec::new());
+        let (mut records, mut weight_roots) = (Vec::new(), Vec::new());
         for equation in &equations.list {
             let first = sub.residuals.len();
             let residuals = equation.residuals_at(problem, theta);
             let root = |e: f64| (equation.weight() * equation.loss.weight(e)).sqrt();
             equation.add_rows(problem, &residuals, root, &mut sub);
             records.push(first..sub.residuals.len());
-            roots.extend(residuals.into_iter().map(root));
+            weight_roots.extend(residuals.into_iter().map(root));
         }
         let mut rows = DMatrix::zeros(sub.residuals.len(), sub.variables);
         for i in 0..sub.residuals.len() {
@@ -43,7 +43,7 @@ impl DenseRows {
         Self {
             residuals: DVector::from_iterator(rows.nrows(), right.map(|e| -e)),
             rows,
-            roots,
+            weight_roots,
             records,
         }
     }

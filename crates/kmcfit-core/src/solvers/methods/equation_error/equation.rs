@@ -54,7 +54,7 @@ impl<'a> Equation<'a> {
         experiment: &'a Experiment,
         measured: &'a Measured,
     ) -> Self {
-        let times = measured.places.len();
+        let times = measured.positions.len();
         let factor = |f: usize| {
             (0..times)
                 .map(|i| measured.response(problem, f, i))
@@ -111,7 +111,7 @@ impl<'a> Equation<'a> {
 
     /// Number of residuals.
     pub fn len(&self) -> usize {
-        let times = self.measured.places.len();
+        let times = self.measured.positions.len();
         self.bumps.as_ref().map_or(times, Bumps::count)
     }
 
@@ -140,8 +140,10 @@ impl<'a> Equation<'a> {
     pub fn forces(&self, nodal: &NodalCoefficients) -> Vec<Vec<f64>> {
         let functions = nodal.functions().zip(&self.factors);
         let forces = functions.map(|(values, factor)| {
-            let pairs = self.measured.places.iter().zip(factor);
-            pairs.map(|(place, x)| blend(values, *place) * x).collect()
+            let pairs = self.measured.positions.iter().zip(factor);
+            pairs
+                .map(|(position, x)| blend(values, *position) * x)
+                .collect()
         });
         let all = forces.chain(std::iter::once(self.force.clone()));
         all.map(|series| self.averaged(series)).collect()
@@ -149,12 +151,18 @@ impl<'a> Equation<'a> {
 
     /// Residual `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` in the form of the equation, N.
     pub fn residuals(&self, nodal: &NodalCoefficients) -> Vec<f64> {
-        let error = |(i, place): (usize, &TimePoint)| {
+        let error = |(i, position): (usize, &TimePoint)| {
             let functions = nodal.functions().zip(&self.factors);
-            let forces = functions.map(|(values, factor)| blend(values, *place) * factor[i]);
+            let forces = functions.map(|(values, factor)| blend(values, *position) * factor[i]);
             forces.fold(-self.force[i], |sum, force| sum + force)
         };
-        let errors = self.measured.places.iter().enumerate().map(error).collect();
+        let errors = self
+            .measured
+            .positions
+            .iter()
+            .enumerate()
+            .map(error)
+            .collect();
         self.averaged(errors)
     }
 
@@ -197,12 +205,12 @@ impl<'a> Equation<'a> {
     /// Derivatives of the residual at time `i` with respect to the parameters, times `root`.
     fn entries(&self, problem: &Problem, i: usize, root: f64) -> Vec<(usize, f64)> {
         let functions = &problem.functions;
-        let TimePoint { step, fraction } = self.measured.places[i];
+        let TimePoint { step, fraction } = self.measured.positions[i];
         let mut entries = Vec::new();
         let set = functions.coefficient_set(self.experiment.coefficient_set);
-        for (place, f) in set.parts() {
+        for (position, f) in set.parts() {
             let first = functions.ranges()[f].start;
-            let response = self.factors[place][i];
+            let response = self.factors[position][i];
             for (side, share) in [1.0 - fraction, fraction].into_iter().enumerate() {
                 if share != 0.0 {
                     let row = functions.get(f).design.row(step + side);
@@ -252,15 +260,15 @@ impl<'a> Equation<'a> {
             .map(|e| 2.0 * weight * self.loss.weight(*e) * e);
         let pushes: Vec<f64> = each.collect();
         let pushes = match &self.bumps {
-            Some(bumps) => bumps.spread(&pushes, self.measured.places.len()),
+            Some(bumps) => bumps.spread(&pushes, self.measured.positions.len()),
             None => pushes,
         };
         let mut nodal: NodalCoefficients = problem.functions.empty_nodal();
         for (values, factor) in nodal.functions_mut().zip(&self.factors) {
-            for ((place, push), x) in self.measured.places.iter().zip(&pushes).zip(factor) {
+            for ((position, push), x) in self.measured.positions.iter().zip(&pushes).zip(factor) {
                 let push = push * x;
-                values[place.step] += push * (1.0 - place.fraction);
-                values[place.step + 1] += push * place.fraction;
+                values[position.step] += push * (1.0 - position.fraction);
+                values[position.step + 1] += push * position.fraction;
             }
         }
         let functions = &problem.functions;

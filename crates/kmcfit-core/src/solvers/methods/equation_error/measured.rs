@@ -94,28 +94,28 @@ impl Measured {
         let channel = experiment.channels.first()?;
         let spacing = equal_spacing(channel.times())?;
         let position = |place: &TimePoint| place.step as f64 + place.fraction;
-        let ends = [self.places.first()?, self.places.last()?].map(position);
+        let ends = [self.positions.first()?, self.positions.last()?].map(position);
         let inner = 2..channel.len().checked_sub(2)?;
         let within = |i: &usize| {
-            let x = position(&channel.nominal_place(*i));
+            let x = position(&channel.nominal_position(*i));
             ends[0] <= x && x <= ends[1]
         };
         let first = inner.clone().find(within)?;
         let count = (first..inner.end).take_while(within).count();
-        let places: Vec<TimePoint> = channel.places().skip(first).take(count).collect();
+        let positions: Vec<TimePoint> = channel.positions().skip(first).take(count).collect();
         let [mut y, mut v, mut a] = [(); 3].map(|()| Vec::with_capacity(count));
         let mut i = 0;
-        for place in &places {
+        for place in &positions {
             let x = position(place);
-            while i + 1 < self.places.len() && position(&self.places[i + 1]) <= x {
+            while i + 1 < self.positions.len() && position(&self.positions[i + 1]) <= x {
                 i += 1;
             }
-            let since = (x - position(&self.places[i])) * step;
-            let [at_y, at_v, at_a] = match self.places.get(i + 1) {
+            let since = (x - position(&self.positions[i])) * step;
+            let [at_y, at_v, at_a] = match self.positions.get(i + 1) {
                 Some(next) if since > 0.0 => self.between(
                     i,
                     since,
-                    (position(next) - position(&self.places[i])) * step,
+                    (position(next) - position(&self.positions[i])) * step,
                 ),
                 _ => [self.y[i], self.v[i], self.a[i]],
             };
@@ -128,7 +128,7 @@ impl Measured {
         let (force, base): (Vec<f64>, Vec<f64>) = inputs.map(|s| (s.force, s.base)).unzip();
         let state = unsmoothed(experiment, scalars, spacing, first..first + count);
         Some(Self {
-            places,
+            positions,
             first,
             y,
             v,
@@ -181,7 +181,7 @@ impl Measured {
         };
         let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
         Some(Self {
-            places: (channel.places().skip(skipped))
+            positions: (channel.positions().skip(skipped))
                 .take(channel.len() - 2 * skipped)
                 .collect(),
             first: skipped,
@@ -219,7 +219,7 @@ impl Measured {
         let stride = kinematics.nodes.windows(2).map(|w| w[1] - w[0]).min();
         let place = |node: &usize| TimePoint::node(*node, experiment.nodes);
         Self {
-            places: kinematics.nodes.iter().map(place).collect(),
+            positions: kinematics.nodes.iter().map(place).collect(),
             first: 0,
             y: kinematics.y.clone(),
             v: kinematics.v.clone(),
@@ -252,7 +252,7 @@ impl Unsmoothed {
         let state = fine_differences(&grouping.means(channel.observed()), spacing);
         let excitation = experiment.excitation.as_ref();
         let inputs = (0..channel.len()).map(|i| match excitation {
-            Some(excitation) => excitation.input_at(channel.nominal_place(i)),
+            Some(excitation) => excitation.input_at(channel.nominal_position(i)),
             None => InputSample::default(),
         });
         let (force, base): (Vec<f64>, Vec<f64>) = inputs.map(|s| (s.force, s.base)).unzip();

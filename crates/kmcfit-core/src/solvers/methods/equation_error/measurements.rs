@@ -121,8 +121,8 @@ impl Measurements {
             let assembly = problem
                 .functions
                 .coefficient_set(experiment.coefficient_set);
-            let (place, _) = assembly.parts().find(|(_, f)| *f == index)?;
-            Some((place, measured.as_ref()?))
+            let (position, _) = assembly.parts().find(|(_, f)| *f == index)?;
+            Some((position, measured.as_ref()?))
         })
     }
 }
@@ -137,7 +137,7 @@ fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
 impl Measured {
     /// Mean square of the factor of function `f`.
     fn mean_square(&self, problem: &Problem, f: usize) -> f64 {
-        let n = self.places.len();
+        let n = self.positions.len();
         let squares = (0..n).map(|i| self.response(problem, f, i).powi(2));
         squares.sum::<f64>() / n.max(1) as f64
     }

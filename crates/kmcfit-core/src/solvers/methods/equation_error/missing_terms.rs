@@ -148,7 +148,7 @@ fn candidates(problem: &Problem, equations: &Equations) -> Vec<Candidate> {
 struct WeakForm<'a> {
     equations: &'a Equations<'a>,
     /// Root of the weight of each bump function.
-    roots: Vec<f64>,
+    weight_roots: Vec<f64>,
     /// Factors of the parameters.
     terms: Vec<DVector<f64>>,
     residuals: DVector<f64>,
@@ -163,7 +163,7 @@ impl<'a> WeakForm<'a> {
         let dense = DenseRows::of(problem, equations, theta);
         let mut weak = Self {
             equations,
-            roots: dense.roots,
+            weight_roots: dense.weight_roots,
             terms: Vec::new(),
             residuals: dense.residuals,
             windows: dense.records,
@@ -187,7 +187,7 @@ impl<'a> WeakForm<'a> {
     /// Factor of a candidate.
     fn factor(&self, term: Law) -> DVector<f64> {
         let each = self.equations.list.iter().flat_map(|e| e.factor_of(term));
-        let weighted = each.zip(&self.roots).map(|(x, root)| root * x);
+        let weighted = each.zip(&self.weight_roots).map(|(x, root)| root * x);
         DVector::from_vec(weighted.collect())
     }
 

@@ -17,11 +17,11 @@ impl Measured {
 
     /// Runs of equally spaced times; between them are gaps.
     pub fn runs(&self, step: f64) -> Vec<Range<usize>> {
-        let at = |place: &TimePoint| (place.step as f64 + place.fraction) * step;
+        let at = |position: &TimePoint| (position.step as f64 + position.fraction) * step;
         let mut runs: Vec<Range<usize>> = Vec::new();
-        for i in 0..self.places.len() {
+        for i in 0..self.positions.len() {
             let is_next = i > 0 && {
-                let gap = at(&self.places[i]) - at(&self.places[i - 1]);
+                let gap = at(&self.positions[i]) - at(&self.positions[i - 1]);
                 (gap - self.weight).abs() <= SAME_SPACING * self.weight
             };
             match runs.last_mut() {
@@ -50,22 +50,23 @@ impl Measured {
 
     /// Residual `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of the equation of motion at all times, N.
     pub fn errors(&self, problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
-        let error = |(i, place): (usize, &TimePoint)| {
+        let error = |(i, position): (usize, &TimePoint)| {
             let forces = nodal.functions().enumerate();
-            let force =
-                |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
+            let force = |(f, values): (usize, &[f64])| {
+                blend(values, *position) * self.response(problem, f, i)
+            };
             forces
                 .map(force)
                 .fold(-self.force[i], |sum, force| sum + force)
         };
-        self.places.iter().enumerate().map(error).collect()
+        self.positions.iter().enumerate().map(error).collect()
     }
 
     /// Response on `nodes` nodes: cubic between times, extended harmonically with the dominant frequency beyond them.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
         let mut response = Trajectory::zeros(1, nodes);
-        let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
-        let last = self.places.len() - 1;
+        let at = |i: usize| self.positions[i].step as f64 + self.positions[i].fraction;
+        let last = self.positions.len() - 1;
         let mut i = 0;
         for node in 0..nodes {
             let x = node as f64;
@@ -123,16 +124,16 @@ impl Measured {
         let mut predicted = channel.observed().to_vec();
         for (i, error) in self.errors(problem, view.nodal).iter().enumerate() {
             predicted[self.first + i] -=
-                gain * error / blend(&view.nodal.inertias[0], self.places[i]);
+                gain * error / blend(&view.nodal.inertias[0], self.positions[i]);
         }
         predicted
     }
 }
 
 /// Value of a function that is linear between nodes.
-pub(super) fn blend(values: &[f64], place: TimePoint) -> f64 {
-    let [left, right] = [values[place.step], values[place.step + 1]];
-    match place.fraction {
+pub(super) fn blend(values: &[f64], position: TimePoint) -> f64 {
+    let [left, right] = [values[position.step], values[position.step + 1]];
+    match position.fraction {
         0.0 => left,
         1.0 => right,
         x => left * (1.0 - x) + right * x,
@@ -157,9 +158,9 @@ mod tests {
             fraction: 0.5,
         };
         let node = |i| TimePoint::node(i, NODES);
-        let places = vec![node(3), node(5), between(6), between(9), node(12), node(18)];
+        let positions = vec![node(3), node(5), between(6), between(9), node(12), node(18)];
         let time = |p: &TimePoint| (p.step as f64 + p.fraction) * STEP;
-        let all: Vec<[f64; 3]> = places.iter().map(|p| state(time(p))).collect();
+        let all: Vec<[f64; 3]> = positions.iter().map(|p| state(time(p))).collect();
         let part = |j: usize| all.iter().map(|state| state[j]).collect::<Vec<f64>>();
         Measured {
             first: 0,
@@ -175,7 +176,7 @@ mod tests {
             filter: Vec::new(),
             smoothing: None,
             at_samples: None,
-            places,
+            positions,
         }
     }
 

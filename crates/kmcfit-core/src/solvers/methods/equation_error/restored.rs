@@ -45,11 +45,11 @@ pub(super) fn restored(
     let [low_y, low_v] = [low(&measured.y)?, low(&measured.v)?];
     let [mut y, mut v] = [measured.y.clone(), measured.v.clone()];
     for _ in 0..ROUNDS {
-        let acceleration = measured.places.iter().enumerate().map(|(i, place)| {
+        let acceleration = measured.positions.iter().enumerate().map(|(i, position)| {
             let terms = problem.system.laws().iter().zip(&nodal.coefficients);
-            let forces = terms.map(|(term, p)| blend(p, *place) * term.phi(y[i], v[i]));
+            let forces = terms.map(|(term, p)| blend(p, *position) * term.phi(y[i], v[i]));
             let force = inputs.force[i] - forces.sum::<f64>();
-            force / blend(&nodal.inertias[0], *place) - inputs.base[i]
+            force / blend(&nodal.inertias[0], *position) - inputs.base[i]
         });
         let acceleration: Vec<f64> = acceleration.collect();
         v = sum(&low_v, &high(integral(&acceleration, measured.weight))?);

@@ -248,7 +248,11 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
             let majorant = channel.majorant(predicted);
             let mut change = change.clone();
             channel.whiten_rows(&mut change);
-            let rows = majorant.weighted.iter().zip(&majorant.roots).zip(&change);
+            let rows = majorant
+                .weighted
+                .iter()
+                .zip(&majorant.weight_roots)
+                .zip(&change);
             misfit += rows
                 .map(|((r, root), d)| (r + root * d).powi(2))
                 .sum::<f64>();

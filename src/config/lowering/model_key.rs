@@ -5,12 +5,12 @@ use crate::error::{InputError, Location};
 
 /// A key of the model file.
 #[derive(Debug, Clone)]
-pub(in crate::config) struct Place<'a> {
+pub(in crate::config) struct ModelKey<'a> {
     pub file: &'a ModelFile,
     pub key: String,
 }
 
-impl<'a> Place<'a> {
+impl<'a> ModelKey<'a> {
     pub fn new(file: &'a ModelFile, key: impl Into<String>) -> Self {
         let key = key.into();
         Self { file, key }
@@ -33,12 +33,12 @@ impl<'a> Place<'a> {
 
     /// Moves an error about a file as a whole to the key that names it. An error in a line of the file keeps its location.
     pub fn asks_for(&self) -> impl Fn(InputError) -> InputError {
-        |error| match &error.place {
+        |error| match &error.location {
             Location::File(path) => {
                 let problem = format!("{}: {}", path.display(), error.problem);
                 let here = self.error(problem);
                 InputError {
-                    place: here.place,
+                    location: here.location,
                     key: here.key,
                     problem: here.problem,
                     ..error

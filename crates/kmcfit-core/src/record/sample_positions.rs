@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// Positions of samples on the grid, without a delay.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum SamplePlaces {
+pub(super) enum SamplePositions {
     /// Sample `i` lies on node `i` of a response over `nodes` nodes.
     Nodes {
         /// Number of samples.
@@ -16,19 +16,19 @@ pub(super) enum SamplePlaces {
     Points(Arc<Vec<TimePoint>>),
 }
 
-impl SamplePlaces {
+impl SamplePositions {
     /// Positions of `times` (s); `None` where one is not within the first `nodes` nodes.
     pub fn of(times: &[f64], grid: &Grid, nodes: usize) -> Option<Self> {
-        let place = |t: &f64| {
-            let place = TimePoint::of(grid, *t)?;
-            match place.as_node() {
+        let position = |t: &f64| {
+            let position = TimePoint::of(grid, *t)?;
+            match position.as_node() {
                 Some(node) => (node < nodes).then(|| TimePoint::node(node, nodes)),
-                None => (place.step + 1 < nodes).then_some(place),
+                None => (position.step + 1 < nodes).then_some(position),
             }
         };
         let on_nodes = times.iter().enumerate();
         let on_nodes =
-            on_nodes.take_while(|(i, t)| place(t).and_then(TimePoint::as_node) == Some(*i));
+            on_nodes.take_while(|(i, t)| position(t).and_then(TimePoint::as_node) == Some(*i));
         let samples = on_nodes.count();
         if samples == times.len() {
             return Some(Self::Nodes { samples, nodes });
@@ -36,7 +36,7 @@ impl SamplePlaces {
         let mut points = Vec::with_capacity(times.len());
         points.extend((0..samples).map(|node| TimePoint::node(node, nodes)));
         for t in &times[samples..] {
-            points.push(place(t)?);
+            points.push(position(t)?);
         }
         Some(Self::Points(Arc::new(points)))
     }
@@ -104,26 +104,26 @@ mod tests {
         for nodes in [5, 11] {
             for samples in [1, 4, nodes] {
                 let times: Vec<f64> = (0..samples).map(|i| grid.time(i)).collect();
-                let places = SamplePlaces::of(&times, &grid, nodes).expect("places");
-                assert!(places.are_nodes());
-                let points: Vec<TimePoint> = places.iter().collect();
+                let positions = SamplePositions::of(&times, &grid, nodes).expect("places");
+                assert!(positions.are_nodes());
+                let points: Vec<TimePoint> = positions.iter().collect();
                 let expected = (0..samples).map(|i| TimePoint::node(i, nodes));
                 assert!(points.iter().copied().eq(expected));
-                let listed = SamplePlaces::Points(Arc::new(points));
+                let listed = SamplePositions::Points(Arc::new(points));
                 for steps in 0..12 {
-                    assert_eq!(places.count_within(steps), listed.count_within(steps));
-                    let [a, b] = [&places, &listed].map(|of| of.first(steps));
+                    assert_eq!(positions.count_within(steps), listed.count_within(steps));
+                    let [a, b] = [&positions, &listed].map(|of| of.first(steps));
                     assert!(a.iter().eq(b.iter()));
                 }
             }
             let outside: Vec<f64> = (0..=nodes).map(|i| grid.time(i)).collect();
-            assert_eq!(SamplePlaces::of(&outside, &grid, nodes), None);
+            assert_eq!(SamplePositions::of(&outside, &grid, nodes), None);
         }
         let between = [grid.time(0), grid.time(1), 1.5, grid.time(7)];
-        let places = SamplePlaces::of(&between, &grid, 11).expect("places");
-        assert!(!places.are_nodes());
-        assert_eq!(places.get(1), TimePoint::node(1, 11));
-        assert_eq!(places.get(2).step, 2);
-        assert_eq!(places.get(3), TimePoint::node(7, 11));
+        let positions = SamplePositions::of(&between, &grid, 11).expect("places");
+        assert!(!positions.are_nodes());
+        assert_eq!(positions.get(1), TimePoint::node(1, 11));
+        assert_eq!(positions.get(2).step, 2);
+        assert_eq!(positions.get(3), TimePoint::node(7, 11));
     }
 }
