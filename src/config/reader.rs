@@ -375,7 +375,7 @@ fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<(), Mistake> {
 
 /// Error for a scalar that is of none of several types: that of the first, for a word that of its choice, with what all of them expect.
 fn any_of(kinds: &'static [ValueType], found: Scalar<'_>) -> Result<(), Mistake> {
-    let has_word = matches!(kinds[0], ValueType::Number)
+    let has_word = matches!(kinds[0], ValueType::Number | ValueType::Count)
         && kinds.iter().any(|kind| matches!(kind, ValueType::Word(_)));
     let mut first = None;
     for kind in kinds {

@@ -203,7 +203,13 @@ impl<'a> Driven<'a> {
         };
         require_positive_masses(grid, self.nodal)?;
         match mode.is_in_paper_order(driven, nodes) {
-            true => paper::respond(driven, initial, trajectory),
+            true => paper::respond(
+                driven.system,
+                driven.nodal,
+                driven.excitation,
+                initial,
+                trajectory,
+            ),
             false => with_model!(driven, links, respond_in(initial, trajectory)),
         }
         require_finite(grid, trajectory)

@@ -4,7 +4,7 @@
 //! derivative: the relative error has a floor that decreases with the step (about 2e-5 at 1000 nodes, 4e-6 at 2000). It
 //! reproduces the paper; the discrete adjoint is exact.
 
-use super::{Driven, Trajectory};
+use super::Trajectory;
 use crate::structure::Law;
 use crate::system::quadrature::{curvature, midpoint, slope};
 use crate::system::{Excitation, NodalCoefficients, StageSamples, State, System, SystemTangent};
@@ -12,15 +12,21 @@ use std::borrow::Cow;
 
 /// Response of one coordinate with damping and stiffness, Eq. 2, by the explicit midpoint rule: `m (y'' + b'') = f - k y - c y'`, where the
 /// paper has no force `f` and a base `b` at rest.
-pub(super) fn respond(driven: Driven, initial: &State, trajectory: &mut Trajectory) {
-    let dt = driven.system.grid.step();
+pub(super) fn respond(
+    system: &System,
+    nodal: &NodalCoefficients,
+    excitation: Option<&Excitation>,
+    initial: &State,
+    trajectory: &mut Trajectory,
+) {
+    let dt = system.grid.step();
     let functions = [
-        &driven.nodal.inertias[0],
-        &driven.nodal.coefficients[0],
-        &driven.nodal.coefficients[1],
+        &nodal.inertias[0],
+        &nodal.coefficients[0],
+        &nodal.coefficients[1],
     ];
     let [force, base] = [Excitation::force, Excitation::frame].map(|input| {
-        let samples = driven.excitation.and_then(|e| input(e, 0));
+        let samples = excitation.and_then(|e| input(e, 0));
         samples.map(StageSamples::stages)
     });
     let acceleration = |[m, c, k]: [f64; 3], stage: usize, i: usize, y: f64, v: f64| {
