@@ -186,41 +186,41 @@ fn numbers() {
     assert_snapshot!(changed("velocity: 1}", "velocity: fast}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: neither a number nor a known word
       found: text `fast`
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: 1.5 m/s}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1.5 m/s`
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
       hint: write 1.5 alone, without a unit
     ");
     assert_snapshot!(changed("velocity: +0.5", "velocity: 0,5"), @"
     m.yaml:11:17: experiments[1].initial.velocity: not a number
       found: text `0,5`
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
       hint: write 0.5, with a decimal point
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: '1'}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1`
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
       hint: write 1, without quotes or leading zeros
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: 1e999}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: text `1e999`
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
       hint: the number is too large
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: .nan}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a finite number
       found: .nan, which is not a number
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: -.inf}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a finite number
       found: an infinite number
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("start: 2.0}", "start: 2.0, min: non}"), @"
     m.yaml:14:41: functions.mass.min: neither a number nor a known word
@@ -231,22 +231,22 @@ fn numbers() {
     assert_snapshot!(changed("velocity: 1}", "velocity: yes}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: neither a number nor a known word
       found: text `yes`
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: true}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: the boolean true
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: }"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: nothing
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: [1, 2]}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: a list
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: {a: 2}}"), @"
     m.yaml:8:45: experiments[0].initial.velocity: unknown key
@@ -256,7 +256,7 @@ fn numbers() {
     assert_snapshot!(changed("velocity: 1}", "velocity: !f 1}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
       found: a value with a YAML tag (`!…`)
-      expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
+      expected: a finite number, a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}, or `estimate`
     ");
 }
 
@@ -291,7 +291,7 @@ fn counts() {
       hint: write 2000
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: many"), @"
-    m.yaml:12:15: grid.nodes: not an integer
+    m.yaml:12:15: grid.nodes: neither a number nor a known word
       found: text `many`
       expected: an integer, 0 or more, or `auto`
     ");
@@ -414,12 +414,12 @@ fn wrong_kinds() {
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: [3.3, 1]"), @"
     m.yaml:8:14: experiments[0].initial: wrong type of value
       found: a list
-      expected: `estimate`, or a map such as {displacement: 3.3, velocity: 1.0}
+      expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: true"), @"
     m.yaml:8:14: experiments[0].initial: wrong type of value
       found: the boolean true
-      expected: `estimate`, or a map such as {displacement: 3.3, velocity: 1.0}
+      expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("title: Linear mass decay", "title: {a: b}"), @"
     m.yaml:2:8: title: wrong type of value
@@ -439,7 +439,7 @@ fn wrong_kinds() {
     assert_snapshot!(changed("fixed: 1", "fixed: [1, 1]"), @"
     m.yaml:18:39: functions.stiffness.fixed: not a number
       found: a list
-      expected: a finite number, `unknown`, or {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}
+      expected: a finite number, {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}, or `unknown`
     ");
     assert_snapshot!(changed("data: start.csv", "data:"), @"
     m.yaml:17:17: the file is not valid YAML: a space or a value is missing behind this `:`

@@ -171,7 +171,7 @@ fn knots() {
       expected: an integer, 0 or more, a list of numbers, or `auto`
     ");
     assert_snapshot!(knots("eleven"), @"
-    m.yaml:5:52: functions.mass.knots: not an integer
+    m.yaml:5:52: functions.mass.knots: neither a number nor a known word
       found: text `eleven`
       expected: an integer, 0 or more, a list of numbers, or `auto`
     ");
@@ -282,10 +282,8 @@ fn keys_that_a_basis_does_not_use() {
       hint: polynomial has a degree
     ");
     assert_snapshot!(with("knots: 5"), @"
-    m.yaml:5:27: functions.mass.knots: this key needs a basis that uses it
-      found: `knots`
-      expected: `basis` beside it
-      hint: piecewise-constant, piecewise-linear and b-spline have knots
+    m.yaml:5:9: functions.mass: a function to be fitted needs a basis
+      expected: `basis`, one of nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
     ");
     assert_snapshot!(with("basis: spline, knots: 5"), @"
     m.yaml:5:27: functions.mass.basis: unknown choice

@@ -70,7 +70,7 @@ pub mod record {
 pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Extremes, Interpolation, Mobility, SecondOrder, Signal, Spectrum,
-        SweepLaw, band_pass, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
+        SweepLaw, band_pass, clipped, cut_off, decimate, driven_oscillator, dropouts, even_spacing,
         high_pass, is_kept_up, jumps, low_pass, median, median_spacing, onset, quantisation,
         spikes, two_forced_modes, two_modes,
     };

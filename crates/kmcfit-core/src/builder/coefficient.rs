@@ -17,7 +17,7 @@ pub(super) const KNOWN_PART: &str = "known_part";
 pub const UNKNOWN_MASS: &str = "functions.mass.fixed";
 
 /// Fixed values, a known constant with a standard deviation, a start in a basis, or for a record the shared function.
-enum Form<'a> {
+pub(super) enum Form<'a> {
     Fixed(TimeHistory),
     Uncertain(Prior),
     Estimated(BasisName, &'a StartSpec),
@@ -79,7 +79,7 @@ impl CoefficientSpec {
     }
 
     /// The form that the keys `fixed`, `start` and `basis` state together.
-    fn form(&self, key: &str) -> Result<Form<'_>, BuildError> {
+    pub(super) fn form(&self, key: &str) -> Result<Form<'_>, BuildError> {
         let is_own = key.starts_with("experiments");
         let error = |part: &str, problem: &str| BuildError::new(format!("{key}.{part}"), problem);
         match (&self.fixed, &self.start, self.basis) {

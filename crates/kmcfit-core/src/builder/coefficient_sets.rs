@@ -98,6 +98,9 @@ impl Builder {
     /// Coefficient sets of the records.
     pub(super) fn coefficient_sets(&self) -> Result<CoefficientSets, BuildError> {
         let (given, entries) = (self.given(), self.entries());
+        for entry in &given {
+            entry.spec.form(&entry.key)?;
+        }
         self.check_known(&entries)?;
         self.check_stiffness()?;
         let shared: Vec<usize> = (0..self.coefficients.len()).collect();
