@@ -67,6 +67,8 @@ pub struct KeyDoc {
     pub needs: Option<&'static str>,
     /// True for a required key.
     pub required: bool,
+    /// True for a key that may have no value: it is then left out.
+    pub nullable: bool,
 }
 
 impl ValueType {
@@ -124,6 +126,7 @@ impl Keys {
                 range: fact("range"),
                 needs: fact("needs"),
                 required: is_required(name),
+                nullable: is_nullable(key),
             }
         });
         let keys = keys.collect::<Vec<_>>().leak();
@@ -147,7 +150,7 @@ impl Keys {
                     ValueType::Map(self.group(name, map))
                 }
                 Some(other) => self.kind(other),
-                None => ValueType::Text,
+                None => unreachable!("a definition {name} of the schema"),
             };
         }
         let list = |name: &str| schema[name].as_array().into_iter().flatten();
@@ -184,9 +187,17 @@ impl Keys {
             "integer" => ValueType::Count,
             "boolean" => ValueType::Bool,
             "array" => ValueType::List(Box::leak(Box::new(self.kind(&schema["items"])))),
-            _ => ValueType::Text,
+            "string" => ValueType::Text,
+            _ => unreachable!("a type of the model file without a value type: {schema}"),
         }
     }
+}
+
+/// True for a schema that accepts null.
+fn is_nullable(schema: &Value) -> bool {
+    let list = |name: &str| schema[name].as_array().into_iter().flatten();
+    let in_types = list("type").any(|one| one == "null");
+    in_types || list("anyOf").any(|one| one["type"] == "null" && one.get("const").is_none())
 }
 
 /// The description of a schema in one line.

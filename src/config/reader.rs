@@ -2,12 +2,14 @@
 //!
 //! The YAML crate reports errors as text with a position. A visitor therefore stores its typed [`Mistake`] in a
 //! [`Report`], together with the path of the current key, and raises a placeholder error, to which the crate adds the
-//! position. What passes is read by serde.
+//! position. What passes is a JSON value of the types that the schema names: names such as 12 or 1.50 keep their spelling, numbers are
+//! numbers, keys without a value are left out. Serde reads it into the model.
 
 use super::key::{KeyDoc, ValueType};
 use crate::spelling::{did_you_mean, integer_in, number_in};
 use crate::text_io::{one_of, quote};
 use serde::de::{DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
 use std::cell::RefCell;
 use std::fmt;
 
@@ -171,9 +173,9 @@ pub(super) struct Typed<'a> {
 }
 
 impl<'a> Typed<'a> {
-    fn scalar<E: Error>(self, found: Scalar<'_>) -> Result<(), E> {
+    fn scalar<E: Error>(self, found: Scalar<'_>) -> Result<Value, E> {
         match (found, self.is_optional) {
-            (Scalar::Nothing, true) => Ok(()),
+            (Scalar::Nothing, true) => Ok(Value::Null),
             _ => scalar(self.kind, found).map_err(|mistake| self.report.raise(mistake)),
         }
     }
@@ -196,8 +198,8 @@ impl<'a> Typed<'a> {
 }
 
 impl<'de> DeserializeSeed<'de> for Typed<'_> {
-    type Value = ();
-    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<(), D::Error> {
+    type Value = Value;
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<Value, D::Error> {
         match self.kind {
             _ if self.is_optional => from.deserialize_option(self),
             // As text, so that a name such as 12 or 1.50 keeps its spelling.
@@ -208,23 +210,23 @@ impl<'de> DeserializeSeed<'de> for Typed<'_> {
 }
 
 impl<'de> Visitor<'de> for Typed<'_> {
-    type Value = ();
+    type Value = Value;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("text")
     }
 
-    scalar_visits!(());
+    scalar_visits!(Value);
 
-    fn visit_some<D: Deserializer<'de>>(self, from: D) -> Result<(), D::Error> {
+    fn visit_some<D: Deserializer<'de>>(self, from: D) -> Result<Value, D::Error> {
         self.of(self.kind, false).deserialize(from)
     }
 
-    fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<(), A::Error> {
+    fn visit_enum<A: EnumAccess<'de>>(self, _: A) -> Result<Value, A::Error> {
         self.scalar(Scalar::Tag)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Value, A::Error> {
         let mut kinds = self.kinds().iter();
         let inner = kinds.find_map(|kind| match kind {
             ValueType::List(inner) => Some(**inner),
@@ -234,16 +236,18 @@ impl<'de> Visitor<'de> for Typed<'_> {
             return self.scalar(Scalar::List);
         };
         let element = self.of(inner, false);
-        for i in 0.. {
+        let mut elements = Vec::new();
+        let mut next = |i| {
             let next = || list.next_element_seed(element);
-            if self.report.below(&format!("[{i}]"), next)?.is_none() {
-                break;
-            }
+            self.report.below(&format!("[{i}]"), next)
+        };
+        while let Some(element) = next(elements.len())? {
+            elements.push(element);
         }
-        Ok(())
+        Ok(Value::Array(elements))
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
         let mut kinds = self.kinds().iter();
         let group = kinds.find_map(|kind| match kind {
             ValueType::Map(group) => Some(*group),
@@ -254,13 +258,17 @@ impl<'de> Visitor<'de> for Typed<'_> {
         };
         let (keys, report) = (group.keys, self.report);
         let mut read = vec![false; keys.len()];
+        let mut object = Map::new();
         while let Some(i) = map.next_key_seed(NextKey { keys, report })? {
             let key = &keys[i];
             if std::mem::replace(&mut read[i], true) {
                 return Err(report.raise(Mistake::RepeatedKey(key.name)));
             }
-            let value = || map.next_value_seed(self.of(key.kind, !key.required));
-            report.below(&format!(".{}", key.name), value)?;
+            let value = || map.next_value_seed(self.of(key.kind, key.nullable));
+            let value = report.below(&format!(".{}", key.name), value)?;
+            if !value.is_null() {
+                object.insert(key.name.to_owned(), value);
+            }
         }
         let missing = keys
             .iter()
@@ -268,7 +276,7 @@ impl<'de> Visitor<'de> for Typed<'_> {
             .find(|(key, read)| key.required && !read);
         match missing {
             Some((key, _)) => Err(report.raise(Mistake::MissingKey(key.name))),
-            None => Ok(()),
+            None => Ok(Value::Object(object)),
         }
     }
 }
@@ -306,17 +314,17 @@ impl Visitor<'_> for NextKey<'_> {
     }
 }
 
-/// Error for a scalar that is not of a type; called for lists and maps as well if the type accepts none.
-fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<(), Mistake> {
+/// The value of a scalar of a type, or the error; called for lists and maps as well if the type accepts none.
+fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<Value, Mistake> {
     let refused = |problem| Err(found.refused(problem, expected(kind)));
     match (kind, found) {
-        (ValueType::Format, Scalar::Integer(1)) => Ok(()),
+        (ValueType::Format, Scalar::Integer(1)) => Ok(1.into()),
         (ValueType::Format, Scalar::Integer(_)) => Err(found
             .refused("this format version is not supported", "1")
             .suggest(Some("a newer version of kmcfit may read it".to_owned()))),
         (ValueType::Format, _) => refused("not a format number"),
-        (ValueType::Number, Scalar::Integer(_)) => Ok(()),
-        (ValueType::Number, Scalar::Float(value)) if value.is_finite() => Ok(()),
+        (ValueType::Number, Scalar::Integer(value)) => Ok((value as f64).into()),
+        (ValueType::Number, Scalar::Float(value)) if value.is_finite() => Ok(value.into()),
         (ValueType::Number, Scalar::Float(_)) => refused("not a finite number"),
         (ValueType::Number, Scalar::Text(text)) => Err(found
             .refused("not a number", expected(kind))
@@ -326,7 +334,7 @@ fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<(), Mistake> {
             refused("a count cannot be negative")
         }
         (ValueType::Count, Scalar::Integer(value)) => match usize::try_from(value) {
-            Ok(_) => Ok(()),
+            Ok(count) => Ok(count.into()),
             Err(_) => refused("the number is too large"),
         },
         (ValueType::Count, Scalar::Float(value))
@@ -343,22 +351,22 @@ fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<(), Mistake> {
         (ValueType::Text | ValueType::Column, Scalar::Text("") | Scalar::Nothing) => {
             Err(Scalar::Nothing.refused("the text is empty", expected(kind)))
         }
-        (ValueType::Text | ValueType::Column, Scalar::Text(_)) => Ok(()),
+        (ValueType::Text | ValueType::Column, Scalar::Text(text)) => Ok(text.into()),
         (ValueType::Text, _) => refused("not a text"),
         (ValueType::Column, Scalar::Integer(number)) => match usize::try_from(number) {
-            Ok(number) if number > 0 => Ok(()),
+            Ok(number) if number > 0 => Ok(number.into()),
             _ => refused("columns are counted from 1"),
         },
         (ValueType::Column, _) => refused("not a column"),
-        (ValueType::Bool, Scalar::Bool(_)) => Ok(()),
-        (ValueType::Word(word), Scalar::Text(text)) if text == word => Ok(()),
+        (ValueType::Bool, Scalar::Bool(value)) => Ok(value.into()),
+        (ValueType::Word(word), Scalar::Text(text)) if text == word => Ok(word.into()),
         (ValueType::Word(word), Scalar::Text(text)) => Err(found
             .wrong_kind(expected(kind))
             .suggest(did_you_mean(text, [word]))),
         (ValueType::Choice(words), Scalar::Text(text)) => {
             let names = || words.iter().map(|(name, _)| *name);
             match names().any(|name| name == text) {
-                true => Ok(()),
+                true => Ok(text.into()),
                 false => Err(Mistake::Value {
                     problem: "unknown choice",
                     found: quote(text),
@@ -373,22 +381,26 @@ fn scalar(kind: ValueType, found: Scalar<'_>) -> Result<(), Mistake> {
     }
 }
 
-/// Error for a scalar that is of none of several types: that of the first, for a word that of its choice, with what all of them expect.
-fn any_of(kinds: &'static [ValueType], found: Scalar<'_>) -> Result<(), Mistake> {
-    let has_word = matches!(kinds[0], ValueType::Number | ValueType::Count)
-        && kinds.iter().any(|kind| matches!(kind, ValueType::Word(_)));
+/// The value of a scalar of one of several types, or an error: that of the first, for a word that of its choice, with what all of them expect.
+/// Text that is written as a number is no name.
+fn any_of(kinds: &'static [ValueType], found: Scalar<'_>) -> Result<Value, Mistake> {
+    let is_number = |text: &str| number_in(text).is_some();
+    let takes_numbers = matches!(kinds[0], ValueType::Number | ValueType::Count);
+    let has_word = takes_numbers && kinds.iter().any(|kind| matches!(kind, ValueType::Word(_)));
     let mut first = None;
     for kind in kinds {
-        let is_word = matches!((kind, found), (ValueType::Choice(_), Scalar::Text(text)) if number_in(text).is_none());
+        let (is_word, is_name) = match (kind, found) {
+            (ValueType::Choice(_), Scalar::Text(text)) => (!is_number(text), true),
+            (ValueType::Text, Scalar::Text(text)) => (false, !takes_numbers || !is_number(text)),
+            _ => (false, true),
+        };
         match scalar(*kind, found) {
-            Ok(()) => return Ok(()),
+            Ok(value) if is_name => return Ok(value),
             Err(mistake) if is_word || first.is_none() => first = Some(mistake),
-            Err(_) => {}
+            _ => {}
         }
     }
-    let Some(mut mistake) = first else {
-        return Ok(());
-    };
+    let mut mistake = first.unwrap_or(Mistake::MissingKey("a type"));
     if let Mistake::Value {
         problem,
         expected,
@@ -397,7 +409,7 @@ fn any_of(kinds: &'static [ValueType], found: Scalar<'_>) -> Result<(), Mistake>
     } = &mut mistake
     {
         *expected = self::expected(ValueType::AnyOf(kinds));
-        if has_word && matches!(found, Scalar::Text(text) if number_in(text).is_none()) {
+        if has_word && matches!(found, Scalar::Text(text) if !is_number(text) && !text.is_empty()) {
             *problem = "neither a number nor a known word";
         }
         if let Scalar::Text(text) = found {
@@ -434,8 +446,14 @@ fn expected(kind: ValueType) -> String {
                     let is_word = |kind: &&ValueType| matches!(kind, ValueType::Word(_));
                     let words = kinds.iter().filter(is_word);
                     let others = kinds.iter().filter(|kind| !is_word(kind));
-                    let all: Vec<String> =
-                        others.chain(words).map(|kind| expected(*kind)).collect();
+                    let all: Vec<String> = others
+                        .chain(words)
+                        .map(|kind| match kind {
+                            // Text beside a number is that of a standard deviation.
+                            ValueType::Text => "the name of a column".to_owned(),
+                            kind => expected(*kind),
+                        })
+                        .collect();
                     let last = all.len() - 1;
                     format!("{}, or {}", all[..last].join(", "), all[last])
                 }

@@ -27,12 +27,12 @@ pub(super) fn read(file: &Path, checked: &Checked) -> Result<ModelSpec, InputErr
         is_optional: false,
         report: &report,
     };
-    let document = || serde_yaml::Deserializer::from_str(text);
-    match keys.deserialize(document()) {
-        Ok(()) => ModelSpec::deserialize(document())
-            .map_err(|error| input_error(file, text, &error, Report::default())),
-        Err(error) => Err(input_error(file, text, &error, report)),
-    }
+    let document = serde_yaml::Deserializer::from_str(text);
+    let value =
+        (keys.deserialize(document)).map_err(|error| input_error(file, text, &error, report))?;
+    ModelSpec::deserialize(value).map_err(|error| {
+        InputError::file(file, "a model that the schema allows cannot be read").found(error)
+    })
 }
 
 fn input_error(file: &Path, text: &str, error: &serde_yaml::Error, report: Report) -> InputError {

@@ -209,6 +209,42 @@ fn names_keep_their_spelling() {
     assert_eq!(spec.title.as_deref(), Some("1.50"));
 }
 
+/// In values that may be written in several ways too.
+#[test]
+fn names_and_numbers_are_read_by_their_keys() {
+    let text = SHORT.replace(
+        "mass: {basis: nodal}",
+        "mass: {fixed: {data: 12, column: 1.50}}",
+    );
+    let text = text.replace(
+        "damping: {basis: nodal}",
+        "damping: {basis: nodal, start: 99999999999999999999, min: {data: yes, column: true}}",
+    );
+    let functions = ModelFile::parse("m.yaml", text).unwrap().spec.functions;
+    let Some(KnownValue::Map(fixed)) = of(&functions, CoefficientKind::MASS).fixed else {
+        panic!("a map")
+    };
+    let names = [fixed.data, fixed.column].map(Option::unwrap_or_default);
+    assert_eq!(names, ["12", "1.50"]);
+    let damping = of(&functions, CoefficientKind::DAMPING);
+    assert_eq!(damping.start, Some(StartSpec::Number(1e20)));
+    let Some(Bound::At(NumberOrColumn::Column(min))) = damping.min else {
+        panic!("a column")
+    };
+    assert_eq!((&*min.data, &*min.column), ("yes", "true"));
+}
+
+/// A coefficient without a value is no coefficient that is left out.
+#[test]
+fn an_empty_function_is_refused() {
+    let text = SHORT.replace("  stiffness", "  cubic_stiffness:\n  stiffness");
+    let error = ModelFile::parse("m.yaml", text).unwrap_err().to_string();
+    assert!(
+        error.contains("functions.cubic_stiffness: wrong type of value"),
+        "{error}"
+    );
+}
+
 #[test]
 fn order_quotes_anchors_and_line_ends_do_not_matter() {
     let short = ModelFile::parse("m.yaml", SHORT).unwrap().spec;

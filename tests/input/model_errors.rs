@@ -439,7 +439,7 @@ fn wrong_kinds() {
     assert_snapshot!(changed("fixed: 1", "fixed: [1, 1]"), @"
     m.yaml:18:39: functions.stiffness.fixed: not a number
       found: a list
-      expected: a finite number, {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}, or `unknown`
+      expected: a finite number, {value: 4.5, sigma: 0.02}, a column: {data: file.csv, column: name}, or `unknown`
     ");
     assert_snapshot!(changed("data: start.csv", "data:"), @"
     m.yaml:17:17: the file is not valid YAML: a space or a value is missing behind this `:`

@@ -111,10 +111,17 @@ pub(super) fn unstable_steps(
     let (nodes, step) = (grid.nodes(), significant(grid.step(), 3));
     let error = about_nodes(file, mode, problem).found(format!("{nodes} nodes, steps of {step} s"));
     let error = error.expected(format!("at least {least} nodes"));
-    error.hint(match mode {
-        BuildMode::Fit => "or start values of a slower motion; `nodes: auto` chooses stable steps",
-        BuildMode::Simulate { .. } => "a response to these steps grows, whatever the system does",
-    })
+    error.hint("a response to these steps grows, whatever the system does")
+}
+
+/// Note on steps that are unstable at the start of a search, where `least` nodes have stable ones.
+pub(super) fn unstable_start(grid: &Grid, least: usize) -> Finding {
+    let nodes = grid.nodes();
+    let text = format!(
+        "grid: with {nodes} nodes the steps are unstable at the start values of the functions; at least {least} nodes have stable ones"
+    );
+    let finding = Finding::new("unstable_start", text);
+    finding.with("nodes", nodes).with("stable_nodes", least)
 }
 
 /// Refuses a grid with too many nodes for the parameters of the functions.

@@ -1,6 +1,6 @@
 //! Finer grids of a model whose number of nodes is automatic.
 
-use super::grid::{FinerNodes, MOST_CHOSEN, stable_nodes, unstable_steps};
+use super::grid::{FinerNodes, MOST_CHOSEN, stable_nodes, unstable_start, unstable_steps};
 use super::{BuildMode, Known, Model, ReadRecords, build_on};
 use crate::config::ModelFile;
 use crate::error::InputError;
@@ -64,7 +64,7 @@ impl Model {
     /// The model on a grid with stable steps at the start, if its grid is automatic and such a grid is possible.
     ///
     /// # Errors
-    /// If the steps are unstable at the start on a grid that is not finer.
+    /// If the steps are unstable at the start on a grid that is not finer, and no function is searched; otherwise a note says so.
     pub(super) fn on_stable_grid(
         mut self,
         file: &ModelFile,
@@ -84,11 +84,14 @@ impl Model {
         // The equation error needs no response.
         let simulates = mode != BuildMode::Fit || self.settings.solver != Solver::EquationError;
         let least = self.stable_nodes(|nodal| simulates && system.is_unstable(nodal));
-        // Start values without any stable grid fail at the first step.
-        match least == 0 || least > MOST_CHOSEN {
-            true => Ok(self),
-            false => Err(unstable_steps(file, mode, &system.grid, least)),
+        // Start values without any stable grid fail at the first step. A search may leave them.
+        let is_searched = mode == BuildMode::Fit && self.problem.functions.scalar_range().start > 0;
+        match (least == 0 || least > MOST_CHOSEN, is_searched) {
+            (true, _) => {}
+            (false, true) => self.automatic.push(unstable_start(&system.grid, least)),
+            (false, false) => return Err(unstable_steps(file, mode, &system.grid, least)),
         }
+        Ok(self)
     }
 
     /// Smallest number of nodes with stable steps for all start functions that are meant; 0 without them.

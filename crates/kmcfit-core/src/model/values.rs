@@ -225,7 +225,7 @@ pub enum NumberOrColumn {
 #[serde(deny_unknown_fields)]
 #[schemars(
     rename = "known_value",
-    extend("expecting" = "{value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}")
+    extend("expecting" = "{value: 4.5, sigma: 0.02}, a column: {data: file.csv, column: name}")
 )]
 pub struct KnownValueMap {
     /// Known value.
