@@ -17,6 +17,7 @@ mod reader;
 mod retired;
 mod run_settings;
 mod scaffold;
+mod scalar;
 mod source;
 mod syntax;
 mod yaml_errors;

@@ -7,8 +7,9 @@ use crate::tables::{ColumnName, Table};
 use crate::units::ScaledUnit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::Interpolation;
-use kmcfit_core::model::ScalarOr;
-use kmcfit_core::model::{ColumnId, ColumnRef, DelayValue, ExperimentSpec, ScalarSpec, SensorSpec};
+use kmcfit_core::model::{
+    ColumnId, ColumnRef, DelayValue, ExperimentSpec, ScalarOr, ScalarSpec, SensorSpec,
+};
 
 /// Settings of the first record of a run with a given input; those of an ideal sensor by default.
 #[derive(Debug, Clone, Default)]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::key_positions::location;
 use super::key_positions::{self, Position};
-use super::reader::Scalar;
+use super::scalar::Scalar;
 use crate::error::InputError;
 use crate::text_io::quote;
 

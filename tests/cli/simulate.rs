@@ -89,6 +89,25 @@ fn unstable_steps_are_refused() {
       hint: a response to these steps grows, whatever the system does
     ");
     bench.run_to(0, &["simulate", "stiff.yaml", "--nodes", "26"]);
+    // Fixed functions have no other start; without a number there is one node for each sample.
+    let fixed = ["2.0", "1.0", "1.0e+3"].map(|value| format!("{{fixed: {value}}}"));
+    let names = ["mass:      ", "damping:   ", "stiffness: "];
+    let of = |line: &str| {
+        names
+            .iter()
+            .position(|name| line.trim_start().starts_with(name))
+    };
+    let lines = stiff.replace("nodes: 21, ", "");
+    let lines = lines.lines().map(|line| match of(line) {
+        Some(i) => format!("  {}{}\n", names[i], fixed[i]),
+        None => format!("{line}\n"),
+    });
+    bench.write("fixed.yaml", &lines.collect::<String>());
+    let (code, _, stderr) = bench.run(&["fit", "fixed.yaml"]);
+    assert!(
+        code == 2 && stderr.contains("at least 26 nodes"),
+        "{stderr}"
+    );
     bench.write("auto.yaml", &stiff.replace("nodes: 21", "nodes: auto"));
     bench.run_to(0, &["fit", "auto.yaml"]);
     bench.run_to(

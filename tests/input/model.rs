@@ -4,14 +4,10 @@ use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
 use kmcfit_core::WeightRule;
-use kmcfit_core::model::ScalarOr;
 use kmcfit_core::model::{
-    BasisName, ByCoefficient, CoefficientSpec, FitMethod, InitialSpec, PenaltyKind, PenaltySpec,
-    Shared,
-};
-use kmcfit_core::model::{
-    Bound, ColumnId, KnotSpec, KnownValue, Nodes, NumberOrColumn, ScalarSpec, SigmaValue,
-    StartSpec, WeightChoice,
+    BasisName, Bound, ByCoefficient, CoefficientSpec, ColumnId, FitMethod, InitialSpec, KnotSpec,
+    KnownValue, Nodes, NumberOrColumn, PenaltyKind, PenaltySpec, ScalarOr, ScalarSpec, Shared,
+    SigmaValue, StartSpec, WeightChoice,
 };
 use kmcfit_core::{CoefficientKind, GradientKind, Method};
 

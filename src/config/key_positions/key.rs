@@ -1,7 +1,7 @@
 //! Reads one key of a YAML mapping, compares it with the key being located, and can stop parsing there by raising an error
 //! whose position is that of the key.
 
-use crate::config::reader::{Scalar, scalar_visits};
+use crate::config::{reader::scalar_visits, scalar::Scalar};
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::cell::Cell;
 use std::fmt;

@@ -2,7 +2,7 @@
 
 use super::Segment;
 use super::key::{KeySeed, stop};
-use crate::config::reader::{Scalar, scalar_visits};
+use crate::config::{reader::scalar_visits, scalar::Scalar};
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
 };

@@ -15,8 +15,7 @@ use crate::memory::MOST_NODES_TIMES_PARAMETERS;
 use crate::number_format::significant;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::system::{Grid, Method};
-use kmcfit_core::model::{BasisName, FitMethod};
-use kmcfit_core::model::{KnotSpec, Nodes};
+use kmcfit_core::model::{BasisName, FitMethod, KnotSpec, Nodes};
 
 /// Most nodes of an automatic choice: the same on every machine.
 pub(super) const MOST_CHOSEN: usize = 10_000_000;
@@ -217,7 +216,7 @@ fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), I
             .found(asked)
             .expected(format!("{duration} or no `duration`")));
     }
-    Ok((start, asked.map_or(duration, |asked| *asked)))
+    Ok((start, asked.copied().unwrap_or(duration)))
 }
 
 /// The stepper; classical Runge–Kutta unless the model says otherwise.

@@ -8,14 +8,18 @@
 mod by_coefficient;
 mod experiment;
 mod functions;
+mod input;
 mod noise;
+mod sensors;
 mod study;
 mod values;
 
 pub use by_coefficient::{ByCoefficient, CoefficientMap, Own, Shared, TruthColumns};
 pub use experiment::*;
 pub use functions::*;
+pub use input::*;
 pub use noise::*;
+pub use sensors::*;
 pub use study::*;
 pub use values::*;
 

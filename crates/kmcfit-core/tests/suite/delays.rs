@@ -8,8 +8,7 @@ use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
-use kmcfit_core::model::CoefficientSpec;
-use kmcfit_core::model::{DelayValue, ScalarSpec, SensorSpec};
+use kmcfit_core::model::{CoefficientSpec, DelayValue, ScalarSpec, SensorSpec};
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 400;

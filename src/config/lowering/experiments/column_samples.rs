@@ -12,9 +12,9 @@ use crate::tables::{
     repeated_times, sample_rates, without_rounding,
 };
 use crate::units::{Measurand, Unit};
-use kmcfit_core::model::ColumnId;
-use kmcfit_core::model::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
-use kmcfit_core::model::{OneOrList, ScalarOr};
+use kmcfit_core::model::{
+    ColumnId, ColumnRef, DecimalSign, Delimiter, ExperimentSpec, OneOrList, ScalarOr, SourceSpec,
+};
 use serde_json::json;
 use std::borrow::Cow;
 use std::ops::Range;

@@ -17,9 +17,7 @@ use kmcfit_core::internals::signal::{
 };
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::both;
-use kmcfit_core::model::KnownValue;
-use kmcfit_core::model::ScalarSpec;
-use kmcfit_core::model::{ExperimentSpec, InitialSpec};
+use kmcfit_core::model::{ExperimentSpec, InitialSpec, KnownValue, ScalarSpec};
 use serde_json::json;
 use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};

@@ -16,10 +16,9 @@ use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use kmcfit_core::internals::system::Grid;
-use kmcfit_core::model::ScalarOr;
-use kmcfit_core::model::{ColumnId, SigmaValue};
 use kmcfit_core::model::{
-    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
+    ColumnId, ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec,
+    ScalarOr, SensorSpec, SigmaValue,
 };
 use noise::{loss, noise_model, weighting, with_quantisation};
 use sampling::{band, decimate};

@@ -6,9 +6,7 @@ use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::number_format::significant;
 use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
-use kmcfit_core::model::ScalarOr;
-use kmcfit_core::model::SigmaValue;
-use kmcfit_core::model::{CorrelationName, LossName};
+use kmcfit_core::model::{CorrelationName, LossName, ScalarOr, SigmaValue};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
 const HUBER: f64 = 1.345;
