@@ -60,6 +60,7 @@
 )]
 mod assessment;
 mod builder;
+pub mod candidates;
 mod constraints;
 mod diagnostics;
 mod functions;

@@ -5,7 +5,7 @@ use crate::problem::Problem;
 use crate::structure::Law;
 
 /// The problem with further coefficients, at zero, and their terms, without penalties and constraints, and its parameters.
-pub(super) fn extended(
+pub(crate) fn extended(
     problem: &Problem,
     theta: &[f64],
     further: Vec<(CoefficientFunction, Law)>,
@@ -33,7 +33,7 @@ pub(super) fn extended(
 }
 
 /// The problem with these functions and further terms, without penalties and constraints.
-pub(super) fn with_functions(
+pub(crate) fn with_functions(
     problem: &Problem,
     functions: Parameterization,
     terms: Vec<Law>,

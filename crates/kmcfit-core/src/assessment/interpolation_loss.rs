@@ -77,13 +77,18 @@ pub(super) fn is_loss(problem: &Problem, losses: &[Doubt], warning: &Doubt) -> b
 
 /// The evaluation with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.
 pub(super) fn evaluation_with_cubics(problem: &Problem, theta: &[f64]) -> Option<Evaluation> {
+    with_cubic_inputs(problem)?.evaluate(theta).ok()
+}
+
+/// The problem with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.
+pub(crate) fn with_cubic_inputs(problem: &Problem) -> Option<Problem> {
     let mut other: Option<Problem> = None;
     for e in 0..problem.experiments.len() {
         if let Some(cubic) = with_cubics(problem, e) {
             other = Some(with_input(other.as_ref().unwrap_or(problem), e, cubic)?);
         }
     }
-    other?.evaluate(theta).ok()
+    other
 }
 
 /// Factor by which lines pass a sine of so many cycles per sample.

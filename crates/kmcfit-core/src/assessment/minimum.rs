@@ -25,22 +25,25 @@ pub(super) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Minimum of `|r + J d|^2`.
-pub(super) struct Minimum {
+pub(crate) struct Minimum {
     /// The minimum.
-    pub(super) squares: f64,
-    rank: usize,
+    pub(crate) squares: f64,
+    pub(crate) rank: usize,
+    /// Root `F` of the inverse of `J^T J`.
+    pub(crate) root: DMatrix<f64>,
     /// The minimiser.
-    pub(super) change: DVector<f64>,
+    pub(crate) change: DVector<f64>,
 }
 
 impl Minimum {
-    pub(super) fn of(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
+    pub(crate) fn of(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
         let root = inverse_root(jacobian);
         let change = -(&root * root.tr_mul(&jacobian.tr_mul(residuals)));
         Self {
             squares: (residuals + jacobian * &change).norm_squared(),
             rank: root.ncols(),
             change,
+            root,
         }
     }
 

@@ -61,6 +61,15 @@ pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome};
 pub use verdict::{VerdictLevel, verdict_reasons};
 
+pub(crate) use extension::{extended, with_functions};
+pub(crate) use interpolation_loss::with_cubic_inputs;
+pub(crate) use minimum::Minimum;
+pub use record_parameters::RecordParameter;
+pub(crate) use record_parameters::{RecordColumns, record_parameters};
+pub(crate) use refinement::{applies, finer_basis};
+pub(crate) use refit::{Refit, uncorrelated};
+pub(crate) use span::{Span, weighted_residuals};
+
 use classical::classical_estimate;
 use friction_width::width_warning;
 use input_jumps::{connected_jump, or_jump};

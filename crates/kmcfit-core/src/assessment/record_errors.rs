@@ -65,6 +65,7 @@ pub(super) fn small_error(
             let (clock, fitted) = on_best_clock(problem, theta, parameter, clock)?;
             fitted.is_white().then(|| difference(problem, e, clock))
         }
+        RecordParameter::Offset(..) | RecordParameter::Drift(..) => None,
         RecordParameter::Gain(e, c) => {
             let (gain, fitted) = with_best_gain(problem, theta, e, c, 1.0 + value)?;
             // A refit that leaves the estimate of the test has a scale that nothing determines.

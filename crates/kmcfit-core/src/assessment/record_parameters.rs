@@ -33,20 +33,47 @@ pub(super) struct Clock {
 
 /// A parameter of a record besides those of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum RecordParameter {
+pub enum RecordParameter {
     /// Delay of the response of an experiment.
     Delay(usize),
     /// Difference of the rates of the clocks of an experiment.
     Rate(usize),
     /// Gain of a channel of an experiment.
     Gain(usize, usize),
+    /// Offset of a channel of an experiment.
+    Offset(usize, usize),
+    /// Drift of a channel of an experiment.
+    Drift(usize, usize),
+}
+
+impl RecordParameter {
+    /// Name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Delay(_) => "delay",
+            Self::Rate(_) => "clock_rate",
+            Self::Gain(..) => "gain",
+            Self::Offset(..) => "offset",
+            Self::Drift(..) => "drift",
+        }
+    }
 }
 
 /// Parameters of the records that errors of the data may need: clocks of records with a measured input, and gains of channels where an
 /// input or another channel shows them.
-pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
+pub(crate) fn record_parameters(problem: &Problem) -> Vec<RecordParameter> {
     let mut found = Vec::new();
     for (e, experiment) in problem.experiments.iter().enumerate() {
+        for (c, channel) in experiment.channels.iter().enumerate() {
+            let sensor = channel.sensor();
+            let is_filtered = !channel.filter().is_empty();
+            if sensor.offset.index().is_none() && !is_filtered {
+                found.push(RecordParameter::Offset(e, c));
+            }
+            if sensor.drift.index().is_none() && !is_filtered {
+                found.push(RecordParameter::Drift(e, c));
+            }
+        }
         let is_estimated = |c: &Channel| c.sensor().is_delayed();
         if !experiment.is_free() && !experiment.channels.iter().any(is_estimated) {
             found.extend([RecordParameter::Delay(e), RecordParameter::Rate(e)]);
@@ -64,7 +91,7 @@ pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
 }
 
 /// Derivatives of the weighted and whitened predictions of all channels in parameters of records; for a gain in its logarithm.
-pub(super) struct RecordColumns {
+pub(crate) struct RecordColumns {
     /// Derivatives in time of the predictions of each channel of an experiment; `None` where they are not asked for or do not exist.
     slopes: Vec<Option<Vec<Vec<f64>>>>,
     /// Roots of the weights of the samples of each channel, or the one of all.
@@ -73,7 +100,7 @@ pub(super) struct RecordColumns {
 
 impl RecordColumns {
     /// For these parameters.
-    pub(super) fn of(
+    pub(crate) fn of(
         problem: &Problem,
         evaluation: &Evaluation,
         parameters: &[RecordParameter],
@@ -100,7 +127,7 @@ impl RecordColumns {
     }
 
     /// The column of a parameter, at the evaluation of the problem.
-    pub(super) fn column(
+    pub(crate) fn column(
         &self,
         problem: &Problem,
         evaluation: &Evaluation,
@@ -125,19 +152,54 @@ impl RecordColumns {
                         let pairs = slopes.iter().zip(channel.times());
                         pairs.map(|(slope, t)| slope * (t - start)).collect()
                     }
+                    RecordParameter::Offset(of, which) if (of, which) == (e, c) => {
+                        vec![1.0; channel.len()]
+                    }
+                    RecordParameter::Drift(of, which) if (of, which) == (e, c) => {
+                        (0..channel.len()).map(|i| channel.elapsed_at(i)).collect()
+                    }
                     _ => vec![0.0; channel.len()],
                 };
-                channel.whiten_rows(&mut rows);
-                match weight_roots.next()?.as_slice() {
-                    [root] => rows.iter_mut().for_each(|row| *row *= root),
-                    weight_roots => {
-                        (rows.iter_mut().zip(weight_roots)).for_each(|(row, root)| *row *= root);
-                    }
-                }
+                weigh(channel, &mut rows, weight_roots.next()?);
                 append(&mut all, rows);
             }
         }
         Some(all)
+    }
+
+    /// Rows of a channel, one for each of its samples, weighted and whitened; zero for all other channels.
+    pub(crate) fn weighted(
+        &self,
+        problem: &Problem,
+        which: (usize, usize),
+        mut rows: Vec<f64>,
+    ) -> Vec<f64> {
+        let mut all = Vec::with_capacity(problem.sample_count());
+        let mut weight_roots = self.weight_roots.iter();
+        for (e, experiment) in problem.experiments.iter().enumerate() {
+            for (c, channel) in experiment.channels.iter().enumerate() {
+                let weight_roots = weight_roots.next();
+                let mut own = match (e, c) == which {
+                    true => std::mem::take(&mut rows),
+                    false => vec![0.0; channel.len()],
+                };
+                if let Some(weight_roots) = weight_roots.filter(|_| (e, c) == which) {
+                    weigh(channel, &mut own, weight_roots);
+                }
+                append(&mut all, own);
+            }
+        }
+        all
+    }
+}
+
+fn weigh(channel: &Channel, rows: &mut [f64], weight_roots: &[f64]) {
+    channel.whiten_rows(rows);
+    match weight_roots {
+        [root] => rows.iter_mut().for_each(|row| *row *= root),
+        weight_roots => {
+            (rows.iter_mut().zip(weight_roots)).for_each(|(row, root)| *row *= root);
+        }
     }
 }
 

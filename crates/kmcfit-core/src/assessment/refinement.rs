@@ -89,7 +89,7 @@ impl BasisTest {
     }
 }
 
-pub(super) fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> bool {
+pub(crate) fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> bool {
     let is_noise = problem.predicted(evaluation).all(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         rms(&residuals) > EXACT * standard_deviation(channel.observed())
@@ -286,7 +286,7 @@ impl FinerBases {
 }
 
 /// A basis that contains the given one and has about twice as many parameters; `None` for a basis that is as fine as the grid.
-fn finer_basis(problem: &Problem, basis: &Basis) -> Option<Basis> {
+pub(crate) fn finer_basis(problem: &Problem, basis: &Basis) -> Option<Basis> {
     let grid = &problem.system.grid;
     let halved = |knots: &[f64]| -> Vec<f64> {
         let pairs = knots

@@ -17,13 +17,13 @@ pub(super) const EXPLAINED: f64 = 0.5;
 const ITERATIONS: u64 = 100;
 
 /// A fit of a changed problem.
-pub(super) struct Refit {
+pub(crate) struct Refit {
     pub problem: Problem,
     pub fit: Fit,
 }
 
 impl Refit {
-    pub(super) fn of(problem: Problem, start: &[f64]) -> Option<Self> {
+    pub(crate) fn of(problem: Problem, start: &[f64]) -> Option<Self> {
         let settings = FitSettings {
             stopping: Stopping {
                 iterations: ITERATIONS,
@@ -35,7 +35,7 @@ impl Refit {
         Some(Self { problem, fit })
     }
 
-    pub(super) fn evaluation(&self) -> &Evaluation {
+    pub(crate) fn evaluation(&self) -> &Evaluation {
         &self.fit.best.evaluation
     }
 
@@ -79,7 +79,7 @@ pub(super) fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
 }
 
 /// The problem with white noise for all channels, beside the stated errors of an input.
-pub(super) fn uncorrelated(problem: &Problem) -> Problem {
+pub(crate) fn uncorrelated(problem: &Problem) -> Problem {
     let mut white = problem.clone();
     without_correlation(&mut white.parts_mut().experiments);
     white

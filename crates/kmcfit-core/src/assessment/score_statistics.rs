@@ -61,7 +61,11 @@ impl Candidate {
             Self::Record(RecordParameter::Rate(e)) => Extension::ClockRate {
                 experiment: experiment(e),
             },
-            Self::Record(RecordParameter::Gain(e, c)) => Extension::Gain {
+            Self::Record(
+                RecordParameter::Gain(e, c)
+                | RecordParameter::Offset(e, c)
+                | RecordParameter::Drift(e, c),
+            ) => Extension::Gain {
                 experiment: experiment(e),
                 channel: problem.experiments[e].channels[c].kind().name().to_owned(),
             },
@@ -103,7 +107,7 @@ impl<'a> ScoreTests<'a> {
         let terms = jacobian.columns(first, kinds.len()).into_owned();
         let model = Span::of(jacobian.remove_columns(first, kinds.len()));
         let rest = model.orthogonal(weighted_residuals(problem, evaluation));
-        let records = record_parameters::parameters(problem);
+        let records = record_parameters::record_parameters(problem);
         let of_records = RecordColumns::of(problem, evaluation, &records);
         Some(Self {
             problem,

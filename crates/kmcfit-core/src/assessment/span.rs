@@ -15,14 +15,14 @@ const APART: f64 = 1e-6;
 const ROWS: usize = 1024;
 
 /// Weighted and whitened residuals of all channels.
-pub(super) fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
+pub(crate) fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
     let each = (problem.predicted(evaluation))
         .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
     DVector::from_vec(each.collect())
 }
 
 /// Orthonormal basis of the derivatives of the model.
-pub(super) struct Span {
+pub(crate) struct Span {
     basis: DMatrix<f64>,
 }
 
@@ -38,7 +38,7 @@ impl Span {
         model.test(problem, DVector::from_vec(column), &rest, true)
     }
 
-    pub(super) fn of(jacobian: DMatrix<f64>) -> Self {
+    pub(crate) fn of(jacobian: DMatrix<f64>) -> Self {
         let root = inverse_root(&jacobian);
         // In place, because all samples have a row.
         let mut basis = jacobian;
@@ -52,10 +52,20 @@ impl Span {
     }
 
     /// Part of a vector orthogonal to the derivatives of the model.
-    pub(super) fn orthogonal(&self, mut vector: DVector<f64>) -> DVector<f64> {
+    pub(crate) fn orthogonal(&self, mut vector: DVector<f64>) -> DVector<f64> {
         let shares = self.basis.tr_mul(&vector);
         vector.gemv(-1.0, &self.basis, &shares, 1.0);
         vector
+    }
+
+    /// Decrease of the square of `rest`, which is orthogonal to the derivatives of the model, by further columns.
+    pub(crate) fn gain(&self, columns: &[DVector<f64>], rest: &DVector<f64>) -> f64 {
+        let mut apart = DMatrix::from_columns(columns);
+        self.make_orthogonal(&mut apart);
+        let moments = apart.tr_mul(rest);
+        let normal = apart.tr_mul(&apart);
+        let solved = normal.cholesky().map(|factor| factor.solve(&moments));
+        solved.map_or(0.0, |change| moments.dot(&change))
     }
 
     /// Leaves the parts of the columns orthogonal to the derivatives of the model.

@@ -1,0 +1,255 @@
+//! What may be added to a model, and the problem with it.
+
+use super::second_mode::Mode;
+use crate::assessment::{RecordParameter, extended, with_cubic_inputs, with_functions};
+use crate::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
+};
+use crate::problem::Problem;
+use crate::record::Sensor;
+use crate::system::Grid;
+
+/// One thing that may be added to a model. Functions, experiments and channels are named by their indices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Addition {
+    /// A force with a constant coefficient.
+    Term(CoefficientKind),
+    /// A function that varies slowly: a polynomial in place of a constant.
+    Variation {
+        /// Index of the function.
+        function: usize,
+        /// Degree of the polynomial.
+        degree: usize,
+    },
+    /// A function with twice as many knots, or a polynomial of twice the degree.
+    FinerBasis {
+        /// Index of the function.
+        function: usize,
+    },
+    /// A constant that jumps.
+    Jump {
+        /// Index of the function.
+        function: usize,
+        /// Time of the jump, s.
+        time: f64,
+    },
+    /// A parameter of a record.
+    Record(RecordParameter),
+    /// Cubic splines in place of lines between the samples of the inputs.
+    CubicInputs,
+    /// A sensor whose samples have parts of the square and the cube of the response.
+    SensorCurve {
+        /// Index of the experiment.
+        experiment: usize,
+        /// Index of its channel.
+        channel: usize,
+    },
+    /// A sine of this frequency in the samples of a channel.
+    Tone {
+        /// Index of the experiment.
+        experiment: usize,
+        /// Index of its channel.
+        channel: usize,
+        /// Frequency, Hz.
+        frequency: f64,
+    },
+    /// The response of a second mode in the samples of a channel.
+    SecondMode {
+        /// Index of the experiment.
+        experiment: usize,
+        /// Index of its channel.
+        channel: usize,
+        /// Natural frequency (Hz) and damping ratio.
+        mode: Mode,
+    },
+}
+
+/// Candidates that a record may not tell apart: where one of them is good, the others are refitted as well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Family {
+    /// The restoring force or the inertia changes with time or amplitude.
+    Elastic,
+    /// The damping changes with time or amplitude.
+    Dissipative,
+    /// The sensor has an offset or a drift.
+    Level,
+    /// The samples have a further frequency.
+    Frequency,
+    /// Input and response are not simultaneous, or the input is not as interpolated.
+    Timing,
+    /// A channel has another factor.
+    Factor,
+}
+
+impl Addition {
+    pub(super) fn family(self, problem: &Problem) -> Family {
+        let of_kind = |kind: CoefficientKind| match kind {
+            CoefficientKind::DAMPING
+            | CoefficientKind::QUADRATIC_DAMPING
+            | CoefficientKind::COULOMB_FRICTION => Family::Dissipative,
+            _ => Family::Elastic,
+        };
+        match self {
+            Self::Term(kind) => of_kind(kind),
+            Self::Variation { function, .. }
+            | Self::FinerBasis { function }
+            | Self::Jump { function, .. } => of_kind(problem.functions.get(function).quantity),
+            Self::Record(RecordParameter::Offset(..) | RecordParameter::Drift(..)) => Family::Level,
+            Self::Record(RecordParameter::Delay(_) | RecordParameter::Rate(_))
+            | Self::CubicInputs => Family::Timing,
+            Self::Record(RecordParameter::Gain(..)) => Family::Factor,
+            Self::SensorCurve { .. } | Self::Tone { .. } | Self::SecondMode { .. } => {
+                Family::Frequency
+            }
+        }
+    }
+
+    /// The problem with the addition, and the start of its fit at the parameters `theta` of the problem and `further` ones; `None` for what is
+    /// added to predictions, and where the problem cannot have it.
+    pub(super) fn added(
+        self,
+        problem: &Problem,
+        theta: &[f64],
+        further: &[f64],
+    ) -> Option<(Problem, Vec<f64>)> {
+        match self {
+            Self::Term(kind) => {
+                let width = super::columns::friction_width(problem, theta)?;
+                let function = CoefficientFunction::constant(kind, 0.0, problem.functions.nodes());
+                let further_terms = vec![(function, kind.law(width)?)];
+                let (changed, mut start) = extended(problem, theta, further_terms)?;
+                start[problem.functions.scalar_range().start] = *further.first()?;
+                Some((changed, start))
+            }
+            Self::Variation { function, degree } => {
+                let basis = Basis::Polynomial { degree };
+                let own = &theta[problem.functions.ranges()[function].clone()];
+                let mut start = own.to_vec();
+                start.extend(further);
+                start.resize(degree + 1, 0.0);
+                in_basis(problem, theta, function, basis, start)
+            }
+            Self::FinerBasis { function } => {
+                let own = problem.functions.get(function);
+                let grid = &problem.system.grid;
+                let finer = crate::assessment::finer_basis(problem, own.basis.as_ref()?)?;
+                let values = own.design.multiply(
+                    &theta[problem.functions.ranges()[function].clone()],
+                    grid.nodes(),
+                );
+                let start = finer.project(grid, &values)?;
+                in_basis(problem, theta, function, finer, start)
+            }
+            Self::Jump { function, time } => {
+                let before = theta[problem.functions.ranges()[function].start];
+                let after = before + further.first()?;
+                let start = vec![before, 0.5 * (before + after), after];
+                in_basis(
+                    problem,
+                    theta,
+                    function,
+                    jump(&problem.system.grid, time)?,
+                    start,
+                )
+            }
+            Self::Record(RecordParameter::Rate(_)) => None,
+            Self::Record(parameter) => with_record(problem, theta, parameter, *further.first()?),
+            Self::CubicInputs => Some((with_cubic_inputs(problem)?, theta.to_vec())),
+            Self::SensorCurve { .. } | Self::Tone { .. } | Self::SecondMode { .. } => None,
+        }
+    }
+}
+
+/// Cells before and after a jump, and that of the node at it: its value, between those before and after, states the time within the step.
+fn jump(grid: &Grid, time: f64) -> Option<Basis> {
+    let node = ((time - grid.start()) / grid.step()).round();
+    let middle = grid.start() + node * grid.step();
+    let (start, end) = (grid.start(), grid.start() + grid.duration());
+    let knots = vec![
+        start,
+        middle - 0.5 * grid.step(),
+        middle + 0.5 * grid.step(),
+        end,
+    ];
+    knots
+        .is_sorted_by(|a, b| a < b)
+        .then_some(Basis::PiecewiseConstant { knots })
+}
+
+/// The problem with a function in another basis, and the start with these parameters of it.
+fn in_basis(
+    problem: &Problem,
+    theta: &[f64],
+    function: usize,
+    basis: Basis,
+    of_function: Vec<f64>,
+) -> Option<(Problem, Vec<f64>)> {
+    let functions = &problem.functions;
+    let grid = &problem.system.grid;
+    (basis.parameters(grid) == of_function.len()).then_some(())?;
+    let range = functions.ranges()[function].clone();
+    let start = [&theta[..range.start], &of_function, &theta[range.end..]].concat();
+    let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
+    let own = &list[function];
+    list[function] = CoefficientFunction {
+        owner: own.owner.clone(),
+        is_known_part: own.is_known_part,
+        offset: own.offset.clone(),
+        ..CoefficientFunction::free(own.quantity, basis, grid, of_function)
+    };
+    let sets = functions.coefficient_sets().to_vec();
+    let changed = Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step())?
+        .with_scalars(functions.scalars().to_vec());
+    Some((with_functions(problem, changed, Vec::new())?, start))
+}
+
+/// The problem with a parameter of a record as its last scalar.
+fn with_record(
+    problem: &Problem,
+    theta: &[f64],
+    parameter: RecordParameter,
+    value: f64,
+) -> Option<(Problem, Vec<f64>)> {
+    let mut scalars = problem.functions.scalars().to_vec();
+    let estimated = ScalarValue::Estimated(scalars.len());
+    let start = match parameter {
+        RecordParameter::Gain(..) => 1.0 + value,
+        _ => value,
+    };
+    scalars.push(ScalarParameter {
+        name: "added".to_owned(),
+        unit: String::new(),
+        start,
+        size: start.abs(),
+        prior: None,
+    });
+    let changed = problem.clone().with(|parts| {
+        parts.functions = parts.functions.clone().with_scalars(scalars);
+        for (e, experiment) in parts.experiments.iter_mut().enumerate() {
+            for (c, channel) in experiment.channels.iter_mut().enumerate() {
+                let own = channel.sensor();
+                let sensor = match parameter {
+                    RecordParameter::Gain(of, at) if (of, at) == (e, c) => Sensor {
+                        gain: estimated,
+                        ..own
+                    },
+                    RecordParameter::Offset(of, at) if (of, at) == (e, c) => Sensor {
+                        offset: estimated,
+                        ..own
+                    },
+                    RecordParameter::Drift(of, at) if (of, at) == (e, c) => Sensor {
+                        drift: estimated,
+                        ..own
+                    },
+                    RecordParameter::Delay(of) if of == e => Sensor {
+                        delay: estimated,
+                        ..own
+                    },
+                    _ => continue,
+                };
+                *channel = channel.clone().with_sensor(sensor);
+            }
+        }
+    });
+    Some((changed.ok()?, [theta, &[start]].concat()))
+}

@@ -1,0 +1,462 @@
+//! The candidates of a problem, judged by one linearisation at its least squares.
+
+use super::Candidate;
+use super::addition::Addition;
+use super::estimates::estimates;
+use super::penalised_misfit::{Judged, Linearised};
+use super::second_mode::{Mode, ModeSamples};
+use crate::assessment::{
+    RecordColumns, Span, extended, finer_basis, record_parameters, weighted_residuals,
+    with_cubic_inputs, with_functions,
+};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
+use crate::identifiability::Quantity;
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::signal::Spectrum;
+use crate::simd::sum::rms;
+use crate::solvers::weighted_jacobian;
+use crate::structure::Law;
+use crate::threads::{analyses_at_once, map};
+use nalgebra::DVector;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Forces that a model may lack.
+const TERMS: [CoefficientKind; 5] = [
+    CoefficientKind::QUADRATIC_STIFFNESS,
+    CoefficientKind::CUBIC_STIFFNESS,
+    CoefficientKind::QUINTIC_STIFFNESS,
+    CoefficientKind::QUADRATIC_DAMPING,
+    CoefficientKind::COULOMB_FRICTION,
+];
+/// Width of the sign of the velocity of friction, relative to the root mean square of the velocity.
+const WIDTH: f64 = 0.01;
+/// Degree of the polynomials of the linear stage.
+const DEGREE: usize = 2;
+/// Cells of the record between which a jump is looked for.
+const CELLS: usize = 26;
+/// Frequencies of the mains, Hz.
+const MAINS: [f64; 2] = [50.0, 60.0];
+/// Peaks of the spectrum of the residuals that are looked at for a second mode, and distances from each, in spacings of frequencies.
+const PEAKS: usize = 3;
+const BESIDE_PEAK: [f64; 3] = [-0.4, 0.0, 0.4];
+/// Damping ratios of a second mode that are looked at.
+const RATIOS: [f64; 3] = [0.003, 0.01, 0.03];
+/// Fewest periods of a second mode in a record.
+const PERIODS: f64 = 4.0;
+
+/// A candidate of the linear stage.
+pub(super) struct LinearCandidate {
+    pub(super) addition: Addition,
+    pub(super) judged: Judged,
+    /// Number of its parameters, after those of the model.
+    pub(super) parameters: usize,
+}
+
+impl LinearCandidate {
+    /// As a candidate beside a model with a penalised misfit.
+    pub(super) fn candidate(&self, problem: &Problem, theta: &[f64], misfit: f64) -> Candidate {
+        let changes = self.judged.estimate.as_slice();
+        let starts = theta.iter().copied().chain(std::iter::repeat(0.0));
+        let at: Vec<f64> = starts.zip(changes).map(|(a, d)| a + d).collect();
+        let is_single = matches!(self.addition, Addition::Term(_) | Addition::Record(_));
+        Candidate {
+            additions: vec![self.addition],
+            to_constants: false,
+            gain: misfit - self.judged.misfit,
+            parameters: self.parameters,
+            order: self.judged.order,
+            // A parameter of the linear stage is the last.
+            estimates: match (is_single, self.addition) {
+                (true, Addition::Term(kind)) => last(kind.name(), kind.unit(), &at, &self.judged),
+                (true, addition) => estimates(addition, problem, &at, &self.judged),
+                _ => Vec::new(),
+            },
+            refit: None,
+        }
+    }
+
+    /// Estimates of the parameters that are added, at the point of linearisation.
+    pub(super) fn further(&self) -> &[f64] {
+        let all = self.judged.change.as_slice();
+        &all[all.len() - self.parameters..]
+    }
+}
+
+fn last(name: &str, unit: &str, at: &[f64], judged: &Judged) -> Vec<Quantity> {
+    let i = at.len() - 1;
+    let quantity = Quantity {
+        gradient: vec![(i, 1.0)],
+        ..Quantity::new(name, unit, at[i])
+    };
+    vec![quantity.with_covariance(&judged.covariance, judged.degrees)]
+}
+
+/// Width of the sign of the velocity that friction gets.
+pub(super) fn friction_width(problem: &Problem, theta: &[f64]) -> Option<f64> {
+    let evaluation = problem.evaluate(theta).ok()?;
+    width(&evaluation)
+}
+
+fn width(evaluation: &Evaluation) -> Option<f64> {
+    let responses = evaluation.trajectories.iter();
+    let speeds: Vec<f64> = responses
+        .flat_map(|r| r.velocity(0).iter().copied())
+        .collect();
+    Some(WIDTH * rms(&speeds)).filter(|width| *width > 0.0 && width.is_finite())
+}
+
+/// What is added, with the derivatives of the weighted residuals in its parameters, or with other residuals.
+struct Column {
+    addition: Addition,
+    columns: Vec<DVector<f64>>,
+    searched: usize,
+}
+
+/// The candidates of a problem with white noise at its least squares, judged.
+pub(super) fn linear_candidates(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    linearised: &Linearised,
+) -> Vec<LinearCandidate> {
+    let span = Span::of(linearised.jacobian.clone());
+    let rest = span.orthogonal(linearised.residuals.clone());
+    let mut all = of_structure(problem, theta, evaluation).unwrap_or_default();
+    all.extend(jumps(problem, evaluation, &span, &rest));
+    all.extend(of_records(problem, evaluation));
+    all.extend(second_modes(problem, evaluation, &span, &rest));
+    let cubic = with_cubic_inputs(problem).and_then(|changed| changed.evaluate(theta).ok());
+    let judged = map(all.len(), analyses_at_once(problem.sample_count()), |i| {
+        linearised.with(&all[i].columns, &linearised.residuals, all[i].searched)
+    });
+    let judged = all
+        .iter()
+        .zip(judged)
+        .map(|(column, judged)| LinearCandidate {
+            addition: column.addition,
+            judged,
+            parameters: column.columns.len(),
+        });
+    let cubic = cubic.map(|evaluation| LinearCandidate {
+        addition: Addition::CubicInputs,
+        judged: linearised.with(&[], &weighted_residuals(problem, &evaluation), 0),
+        parameters: 0,
+    });
+    judged.chain(cubic).collect()
+}
+
+/// Functions that are estimated without a known value, a penalty or a prior.
+fn open_functions(problem: &Problem) -> impl Iterator<Item = (usize, &CoefficientFunction)> {
+    let functions = problem.functions.iter().enumerate();
+    functions.filter(|(index, function)| {
+        let is_penalised = problem.penalties.iter().any(|p| p.function == *index)
+            || problem.variations.iter().any(|v| v.function == *index)
+            || problem.jumps.iter().any(|j| j.function == *index);
+        function.basis.is_some() && !is_penalised && function.prior.is_none()
+    })
+}
+
+/// Forces, and functions that vary more.
+fn of_structure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Vec<Column>> {
+    let grid = &problem.system.grid;
+    let set = problem.functions.coefficient_set(0);
+    let has = |kind: CoefficientKind| {
+        let mut own = set.iter().map(|f| problem.functions.get(*f).quantity);
+        own.any(|own| own == kind)
+    };
+    let width = width(evaluation)?;
+    // The next power.
+    let is_next = |kind: CoefficientKind| {
+        kind != CoefficientKind::QUINTIC_STIFFNESS || has(CoefficientKind::CUBIC_STIFFNESS)
+    };
+    let terms = TERMS
+        .into_iter()
+        .filter(|kind| !has(*kind) && is_next(*kind));
+    let terms: Vec<(CoefficientKind, Law)> =
+        terms.filter_map(|k| Some((k, k.law(width)?))).collect();
+    let nodes = problem.functions.nodes();
+    let constants = terms
+        .iter()
+        .map(|(kind, law)| (CoefficientFunction::constant(*kind, 0.0, nodes), *law));
+    let (longer, _) = extended(problem, theta, constants.collect())?;
+    let mut list: Vec<CoefficientFunction> = longer.functions.iter().cloned().collect();
+    let mut varied = Vec::new();
+    for (index, own) in open_functions(problem) {
+        let (addition, basis) = match own.parameters() {
+            1 => {
+                let degree = DEGREE;
+                let of_time = Addition::Variation {
+                    function: index,
+                    degree,
+                };
+                (of_time, Basis::Polynomial { degree })
+            }
+            _ => {
+                let Some(finer) = own.basis.as_ref().and_then(|b| finer_basis(problem, b)) else {
+                    continue;
+                };
+                (Addition::FinerBasis { function: index }, finer)
+            }
+        };
+        list[index] = in_basis(own, basis, problem);
+        varied.push((index, addition));
+    }
+    let sets = longer.functions.coefficient_sets().to_vec();
+    let functions = Parameterization::with_coefficient_sets(list, sets, nodes, grid.step())?
+        .with_scalars(problem.functions.scalars().to_vec());
+    (functions.parameters() <= 2 * FEW_PARAMETERS).then_some(())?;
+    let longer = longer.with(|parts| parts.functions = functions).ok()?;
+    // The coefficients that the evaluation lacks are zero.
+    let jacobian = weighted_jacobian(&longer, evaluation);
+    let columns = |range: Range<usize>| range.map(|j| jacobian.column(j).into_owned()).collect();
+    let mut all = Vec::new();
+    for (index, addition) in varied {
+        let range = longer.functions.ranges()[index].clone();
+        let first = match addition {
+            // The first polynomial is the constant.
+            Addition::Variation { .. } => range.start + 1,
+            _ => range.start,
+        };
+        all.push(Column {
+            addition,
+            columns: columns(first..range.end),
+            searched: 0,
+        });
+        if let Addition::Variation { function, .. } = addition {
+            all.push(Column {
+                addition: Addition::Variation {
+                    function,
+                    degree: 1,
+                },
+                columns: columns(first..first + 1),
+                searched: 0,
+            });
+        }
+    }
+    let first = longer.functions.scalar_range().start - terms.len();
+    for (i, (kind, _)) in terms.iter().enumerate() {
+        all.push(Column {
+            addition: Addition::Term(*kind),
+            columns: columns(first + i..first + i + 1),
+            searched: 0,
+        });
+    }
+    Some(all)
+}
+
+/// A function of an open kind in another basis, at zero.
+fn in_basis(own: &CoefficientFunction, basis: Basis, problem: &Problem) -> CoefficientFunction {
+    let grid = &problem.system.grid;
+    let zeros = vec![0.0; basis.parameters(grid)];
+    CoefficientFunction {
+        owner: own.owner.clone(),
+        is_known_part: own.is_known_part,
+        offset: own.offset.clone(),
+        ..CoefficientFunction::free(own.quantity, basis, grid, zeros)
+    }
+}
+
+/// The jump of each constant stiffness that leaves the least squares.
+fn jumps(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    span: &Span,
+    rest: &DVector<f64>,
+) -> Vec<Column> {
+    let stiffness = open_functions(problem)
+        .filter(|(_, f)| f.parameters() == 1 && f.quantity == CoefficientKind::STIFFNESS);
+    let each = stiffness.filter_map(|(index, own)| {
+        let grid = &problem.system.grid;
+        let knots = crate::functions::basis::uniform_knots(grid, CELLS + 1);
+        let basis = Basis::PiecewiseConstant {
+            knots: knots.clone(),
+        };
+        let mut list: Vec<CoefficientFunction> = problem.functions.iter().cloned().collect();
+        list[index] = in_basis(own, basis, problem);
+        let sets = problem.functions.coefficient_sets().to_vec();
+        let functions =
+            Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step())?
+                .with_scalars(problem.functions.scalars().to_vec());
+        let range = functions.ranges()[index].clone();
+        let cells = with_functions(problem, functions, Vec::new())?;
+        let jacobian = weighted_jacobian(&cells, evaluation);
+        let mut after = DVector::zeros(jacobian.nrows());
+        let mut best: Option<(f64, f64, DVector<f64>)> = None;
+        for cell in (1..CELLS).rev() {
+            after += jacobian.column(range.start + cell);
+            let gain = span.gain(std::slice::from_ref(&after), rest);
+            if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
+                best = Some((gain, knots[cell], after.clone()));
+            }
+        }
+        let (_, time, column) = best?;
+        Some(Column {
+            addition: Addition::Jump {
+                function: index,
+                time,
+            },
+            columns: vec![column],
+            searched: 1,
+        })
+    });
+    each.collect()
+}
+
+/// Parameters of records, and what their sensors may add to the samples.
+fn of_records(problem: &Problem, evaluation: &Evaluation) -> Vec<Column> {
+    let parameters = record_parameters(problem);
+    let columns = RecordColumns::of(problem, evaluation, &parameters);
+    let of_parameters = parameters.iter().filter_map(|parameter| {
+        let column = columns.column(problem, evaluation, *parameter)?;
+        Some(Column {
+            addition: Addition::Record(*parameter),
+            columns: vec![DVector::from_vec(column)],
+            searched: 0,
+        })
+    });
+    let mut all: Vec<Column> = of_parameters.collect();
+    for (e, experiment) in problem.experiments.iter().enumerate() {
+        for c in 0..experiment.channels.len() {
+            let tones = MAINS.into_iter();
+            let tones = tones.map(|frequency| Addition::Tone {
+                experiment: e,
+                channel: c,
+                frequency,
+            });
+            let curve = Addition::SensorCurve {
+                experiment: e,
+                channel: c,
+            };
+            all.extend(tones.chain([curve]).map(|addition| Column {
+                addition,
+                columns: beside(problem, evaluation, &columns, addition),
+                searched: 0,
+            }));
+        }
+    }
+    all
+}
+
+/// Weighted columns of what a sensor adds to its samples: a tone, or a square and a cube of the response.
+pub(super) fn beside(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    columns: &RecordColumns,
+    addition: Addition,
+) -> Vec<DVector<f64>> {
+    let rows = |(e, c): (usize, usize), value: &dyn Fn(usize) -> f64| {
+        let count = problem.experiments[e].channels[c].len();
+        let own = (0..count).map(value).collect();
+        DVector::from_vec(columns.weighted(problem, (e, c), own))
+    };
+    match addition {
+        Addition::SensorCurve {
+            experiment: e,
+            channel: c,
+        } => {
+            let predicted = &evaluation.predictions[e][c];
+            let size = rms(predicted).max(f64::MIN_POSITIVE);
+            let powers = [2, 3].map(|power| rows((e, c), &|i| (predicted[i] / size).powi(power)));
+            powers.into()
+        }
+        Addition::Tone {
+            experiment: e,
+            channel: c,
+            frequency,
+        } => {
+            let times = problem.experiments[e].channels[c].times();
+            let phase = |i: usize| TAU * frequency * (times[i] - times[0]);
+            vec![
+                rows((e, c), &|i| phase(i).cos()),
+                rows((e, c), &|i| phase(i).sin()),
+            ]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Weighted columns of a mode of a channel.
+pub(super) fn mode_columns(
+    problem: &Problem,
+    columns: &RecordColumns,
+    samples: &ModeSamples,
+    (e, c): (usize, usize),
+    mode: Mode,
+) -> Vec<DVector<f64>> {
+    let own = samples.columns(mode);
+    let weighted = own.column_iter().map(|column| {
+        let column = column.iter().copied().collect();
+        DVector::from_vec(columns.weighted(problem, (e, c), column))
+    });
+    weighted.collect()
+}
+
+/// The second mode in each channel that leaves the least squares.
+fn second_modes(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    span: &Span,
+    rest: &DVector<f64>,
+) -> Vec<Column> {
+    let columns = RecordColumns::of(problem, evaluation, &[]);
+    let mut all = Vec::new();
+    let mut rows = problem.channel_samples().into_iter();
+    for (e, experiment) in problem.experiments.iter().enumerate() {
+        for c in 0..experiment.channels.len() {
+            let Some(rows) = rows.next() else {
+                continue;
+            };
+            let Some(samples) = ModeSamples::of(problem, e, c) else {
+                continue;
+            };
+            let Some(spectrum) = Spectrum::of(&rest.as_slice()[rows], samples.spacing) else {
+                continue;
+            };
+            let mut best: Option<(f64, Mode, Vec<DVector<f64>>)> = None;
+            for mode in modes(&spectrum) {
+                let found = mode_columns(problem, &columns, &samples, (e, c), mode);
+                let gain = span.gain(&found, rest);
+                if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
+                    best = Some((gain, mode, found));
+                }
+            }
+            all.extend(best.map(|(_, mode, columns)| Column {
+                addition: Addition::SecondMode {
+                    experiment: e,
+                    channel: c,
+                    mode,
+                },
+                columns,
+                searched: 2,
+            }));
+        }
+    }
+    all
+}
+
+/// Modes at the highest peaks of a spectrum.
+fn modes(spectrum: &Spectrum) -> Vec<Mode> {
+    let resolution = spectrum.resolution();
+    let density: Vec<(f64, f64)> = spectrum
+        .frequencies()
+        .zip(spectrum.density().iter().copied())
+        .collect();
+    let is_peak = |i: usize| {
+        let at = |i: usize| density.get(i).map_or(0.0, |(_, d)| *d);
+        at(i) >= at(i.wrapping_sub(1)) && at(i) > at(i + 1)
+    };
+    let mut peaks: Vec<(f64, f64)> = (0..density.len())
+        .filter(|i| is_peak(*i) && density[*i].0 > PERIODS * resolution)
+        .map(|i| density[i])
+        .collect();
+    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut found = Vec::new();
+    for (peak, _) in peaks.into_iter().take(PEAKS) {
+        for apart in BESIDE_PEAK {
+            found.extend(RATIOS.map(|ratio| [peak + apart * resolution, ratio]));
+        }
+    }
+    found
+}

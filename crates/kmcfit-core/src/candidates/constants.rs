@@ -1,0 +1,100 @@
+//! Constants in place of functions that vary, with one thing more: forces that depend on the amplitude, an error of a record, a second mode.
+//!
+//! In one record with a varying amplitude `A(t)` a coefficient that varies with time and one that depends on the amplitude are nearly
+//! interchangeable: by harmonic balance
+//!
+//! ```text
+//! k(t) ~ k + 3/4 k3 A^2 + 5/8 k5 A^4,    c(t) ~ c + 8/(3 pi) c2 w A + 4/pi F/(w A)
+//! ```
+
+use super::penalised_misfit::Linearised;
+use super::{Addition, Candidate, Candidates, GAIN};
+use crate::assessment::{Refit, with_functions};
+use crate::functions::{Basis, CoefficientFunction, Parameterization};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::signal::median;
+
+/// The candidates beside constants that are about as good as the model or better, in place of all functions of a problem with white noise that
+/// vary; `None` where none varies.
+pub(super) fn of(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<Vec<Candidate>> {
+    let (constants, start) = constants(problem, theta)?;
+    let held = held_by_penalties(problem, theta, evaluation);
+    let price = (problem.sample_count() as f64).ln();
+    let own = Linearised::at(problem, evaluation).own().misfit - held * price;
+    let refit = Refit::of(constants, &start)?;
+    let alone = Linearised::at(&refit.problem, refit.evaluation()).own();
+    let beside = Candidates::at(&refit.problem, &refit.fit.best.parameters, Some(own))?;
+    let alone = Candidate {
+        additions: Vec::new(),
+        to_constants: true,
+        gain: own - alone.misfit,
+        parameters: 0,
+        order: alone.order,
+        estimates: Vec::new(),
+        refit: Some(refit.fit.best.parameters.clone()),
+    };
+    let others = beside.list.into_iter().filter(|c| c.refit.is_some());
+    // A function that varies in another basis is no constant.
+    let is_constant = |addition: &Addition| {
+        !matches!(
+            addition,
+            Addition::Variation { .. } | Addition::FinerBasis { .. }
+        )
+    };
+    let others = others.filter(|c| c.additions.iter().all(is_constant));
+    let all = std::iter::once(alone)
+        .chain(others)
+        .map(|candidate| Candidate {
+            to_constants: true,
+            ..candidate
+        });
+    Some(all.filter(|candidate| candidate.gain > -GAIN).collect())
+}
+
+/// Parameters that penalties hold.
+fn held_by_penalties(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
+    if problem.penalties.is_empty() {
+        return 0.0;
+    }
+    let effective = problem.effective_parameters(theta, evaluation);
+    let pairs = problem.penalties.iter().zip(effective.unwrap_or_default());
+    let held = pairs.map(|(penalty, effective)| {
+        problem.functions.ranges()[penalty.function].len() as f64 - effective
+    });
+    held.sum()
+}
+
+/// The problem with a constant for each function that can vary, and its start at their medians; `None` where none can.
+fn constants(problem: &Problem, theta: &[f64]) -> Option<(Problem, Vec<f64>)> {
+    let functions = &problem.functions;
+    let grid = &problem.system.grid;
+    let values = functions.values(theta);
+    let mut start = Vec::new();
+    let mut list: Vec<CoefficientFunction> = Vec::new();
+    for (f, own) in functions.iter().enumerate() {
+        let is_varying = own.parameters() > 1 && own.offset.iter().all(|known| *known == 0.0);
+        if is_varying {
+            let level = median(&*values[f]);
+            start.push(level);
+            list.push(CoefficientFunction {
+                owner: own.owner.clone(),
+                is_known_part: own.is_known_part,
+                ..CoefficientFunction::free(own.quantity, Basis::Constant, grid, vec![level])
+            });
+        } else {
+            start.extend(&theta[functions.ranges()[f].clone()]);
+            list.push(own.clone());
+        }
+    }
+    (start.len() + functions.scalars().len() < theta.len()).then_some(())?;
+    start.extend(problem.scalars(theta));
+    let sets = functions.coefficient_sets().to_vec();
+    let functions = Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step())?
+        .with_scalars(functions.scalars().to_vec());
+    Some((with_functions(problem, functions, Vec::new())?, start))
+}
