@@ -3,7 +3,7 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use kmcfit_core::internals::objective::GradientKind;
+use kmcfit_core::objective::GradientKind;
 use std::hint::black_box;
 
 /// The paper's number of nodes, and one that exceeds the caches.

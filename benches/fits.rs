@@ -4,7 +4,7 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit_core::internals::study::multistart::multistart;
+use kmcfit_core::study::multistart;
 use std::hint::black_box;
 use std::path::Path;
 use std::process::Command;

@@ -15,12 +15,12 @@ mod common;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::step::{Driven, EngineMode};
-use kmcfit_core::internals::study::multistart::multistart;
-use kmcfit_core::{
-    Ends, Excitation, Grid, Law, Method, NodalCoefficients, StageSamples, State, Structure, System,
-    Trajectory,
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::step::{Driven, EngineMode, Trajectory};
+use kmcfit_core::structure::{Ends, Law, Structure};
+use kmcfit_core::study::multistart;
+use kmcfit_core::system::{
+    Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
 use std::hint::black_box;
 use std::time::Instant;

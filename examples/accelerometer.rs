@@ -1,10 +1,10 @@
 // A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness with standard errors.
 
 use kmcfit::tables::Table;
-use kmcfit_core::Bands;
-use kmcfit_core::Interpolation;
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::identifiability::Bands;
 use kmcfit_core::model::CoefficientSpec;
-use kmcfit_core::{Builder, Record};
+use kmcfit_core::signal::Interpolation;
 use std::error::Error;
 
 /// Value and standard error of mass (kg), damping (N s/m) and stiffness (N/m).

@@ -1,7 +1,7 @@
 // Damping and stiffness of a free decay with known mass, from arrays.
 
+use kmcfit_core::builder::{Builder, Record};
 use kmcfit_core::model::CoefficientSpec;
-use kmcfit_core::{Builder, Record};
 use std::error::Error;
 
 /// Damping (N s/m) and stiffness (N/m).

@@ -1,7 +1,7 @@
 // Loads the results of `kmcfit fit models/linear-mass.yaml` and simulates the response from another initial state.
 
 use kmcfit::Run;
-use kmcfit_core::State;
+use kmcfit_core::system::State;
 use std::error::Error;
 use std::path::Path;
 

@@ -4,10 +4,10 @@
 //! `cargo run --example make_records -- data`
 
 use kmcfit::results::write_whole;
-use kmcfit_core::ChannelKind;
-use kmcfit_core::internals::step::{Trajectory, observe};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{
+use kmcfit_core::record::ChannelKind;
+use kmcfit_core::step::{Trajectory, observe};
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
     TimePoint,
 };

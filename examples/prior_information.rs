@@ -2,11 +2,11 @@
 // record.
 
 use kmcfit::tables::Table;
-use kmcfit_core::CoefficientKind;
-use kmcfit_core::Method;
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::constraints::{Constraint, Shape};
 use kmcfit_core::model::CoefficientSpec;
-use kmcfit_core::{Builder, Record};
-use kmcfit_core::{Constraint, Shape};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::Method;
 use std::error::Error;
 
 /// Largest error of the mass, kg; the true mass decreases linearly from 1 to 0.5 kg.

@@ -1,10 +1,11 @@
 // Number of parameter combinations that a free decay determines, by itself and together with a shaker run; no measured
 // values are needed.
 
-use kmcfit_core::internals::identifiability::{ScaleFreedom, structural_rank};
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::identifiability::{ScaleFreedom, structural_rank};
 use kmcfit_core::model::CoefficientSpec;
-use kmcfit_core::{Builder, Record};
-use kmcfit_core::{Excitation, Grid, Law, Method, NodalCoefficients, State, Structure, System};
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::error::Error;
 
 /// Structural rank of the free record and of the pair, each with `true` if a common factor of all functions is

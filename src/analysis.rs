@@ -1,5 +1,5 @@
 //! From a model to its results in memory: with the data in memory too it needs no files and threads, and no clock but that of the
-//! [`Host`](kmcfit_core::internals::host::Host).
+//! [`Host`](kmcfit_core::host::Host).
 
 use crate::config::{BuildMode, ModelFile, build};
 use crate::error::InputError;
@@ -7,7 +7,7 @@ use crate::fitting::fit_or_no_response;
 use crate::report::document::{ResultDocument, Verdict};
 use crate::report::trial::advice;
 use crate::report::{AnswerRow, CompletedFit, RequestedFiles, answer, summary};
-use kmcfit_core::internals::solvers::{IterationRecord, Observer};
+use kmcfit_core::solvers::{IterationRecord, Observer};
 
 /// A fitted model with its results.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! Findings, warnings and suggestions of a document: severity, kind, quantities and a sentence.
 
-use kmcfit_core::internals::assessment::{Doubt, Severity};
+use kmcfit_core::assessment::{Doubt, Severity};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt;

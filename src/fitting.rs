@@ -2,12 +2,12 @@
 
 use crate::config::{AutomaticGrid, Model, WeightSearch};
 use crate::finding::Finding;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{
     Fit, GridNotice, Observer, OnNodes, WeightPath, choose_weight_watched, fit_on_refined_grids,
     fit_with_noise_watched, no_response,
 };
-use kmcfit_core::internals::step::SimulationError;
+use kmcfit_core::step::SimulationError;
 
 /// A fit, and the model as fitted.
 pub struct ModelFit {

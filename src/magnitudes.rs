@@ -11,8 +11,8 @@
 
 use crate::number_format::significant;
 use crate::units::{Measurand, Unit};
-use kmcfit_core::internals::assessment::Implausible;
-use kmcfit_core::internals::signal::{Spectrum, median};
+use kmcfit_core::assessment::Implausible;
+use kmcfit_core::signal::{Spectrum, median};
 use std::f64::consts::{PI, TAU};
 
 /// Standard gravity, m/s^2.

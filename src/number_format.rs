@@ -1,6 +1,6 @@
 //! Numbers as people write them in a sentence.
 
-pub(crate) use kmcfit_core::internals::number_format::{at_most, significant};
+pub(crate) use kmcfit_core::number_format::{at_most, significant};
 
 /// A number of things: `1 sample`, `3 samples`.
 pub(crate) fn count(number: usize, thing: &str) -> String {

@@ -8,7 +8,7 @@ mod spelling;
 use crate::error::InputError;
 use crate::spelling::nearest;
 use crate::text_io::{one_of, quote};
-use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::record::ChannelKind;
 use spelling::{names, product};
 
 /// Measured quantity of a channel.

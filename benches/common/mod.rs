@@ -2,14 +2,14 @@
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::study::multistart::{Multistart, Ranges};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::functions::{CoefficientFunction, Parameterization};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Solver, Stopping, fit};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::study::{Multistart, Ranges};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -173,7 +173,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping: Stopping::default(),
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     (

@@ -7,7 +7,7 @@ use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
 use kmcfit::report::{CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json};
 use kmcfit::results::OutputFolder;
-use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
+use kmcfit_core::solvers::{IterationRecord, Observer, Status};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@ use kmcfit::config::{ModelFile, Override};
 use kmcfit::fleet::{
     FleetFolder, FleetRecord, RecordList, Row, Trend, check_model, finish, fit_record,
 };
-use kmcfit_core::internals::threads::sharing;
+use kmcfit_core::threads::sharing;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use std::path::PathBuf;

@@ -58,8 +58,8 @@ mod _kmcfit {
     /// Names of the coefficient functions.
     #[pyfunction]
     fn coefficient_names() -> Vec<&'static str> {
-        let kinds = kmcfit_core::CoefficientKind::ALL.into_iter();
-        kinds.map(kmcfit_core::CoefficientKind::name).collect()
+        let kinds = kmcfit_core::structure::CoefficientKind::ALL.into_iter();
+        kinds.map(kmcfit_core::structure::CoefficientKind::name).collect()
     }
 
     /// Version of the package.

@@ -2,9 +2,9 @@
 
 use crate::errors::{Failure, guarded};
 use crate::source::{RawModel, from_bytes, to_bytes};
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem as Core;
-use kmcfit_core::internals::step::SimulationError;
+use kmcfit_core::objective::Evaluation;
+use kmcfit_core::problem::Problem as Core;
+use kmcfit_core::step::SimulationError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;

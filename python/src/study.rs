@@ -6,7 +6,7 @@ use kmcfit::Run;
 use kmcfit::cli::{CommandError, study_into};
 use kmcfit::config::{ModelFile, Override};
 use kmcfit::report::study::{StudiedFit, StudyDocument};
-use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::problem::Problem;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

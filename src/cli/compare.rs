@@ -11,7 +11,7 @@ use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{RequestedFiles, json};
 use crate::results::{OutputFolder, RESULT};
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::solvers::Status;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

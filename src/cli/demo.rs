@@ -9,8 +9,8 @@ use crate::report::compare::{Comparison, Measures};
 use crate::report::document::{Verdict, level_in_words};
 use crate::report::{CsvTable, Run};
 use crate::results::OutputFolder;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{Grid, Method, NodalCoefficients, State, System};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -2,8 +2,8 @@
 
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
-use kmcfit_core::internals::host::{self, Host};
-use kmcfit_core::internals::simd::{LIMIT, arithmetics, check_limit};
+use kmcfit_core::host::{Host, set_host};
+use kmcfit_core::simd::{LIMIT, arithmetics, check_limit};
 use std::sync::LazyLock;
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Provides the functions of the host.
 pub fn provide_host() {
-    host::set_host(Host {
+    set_host(Host {
         clock: || START.elapsed(),
         progress: super::progress::show_jobs,
         is_interrupted: super::interrupt::is_asked,

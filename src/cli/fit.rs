@@ -15,9 +15,9 @@ use crate::report::{
 };
 use crate::results::{OutputFolder, RESULT};
 use console::Term;
-use kmcfit_core::internals::assessment::{Doubt, VerdictLevel};
-use kmcfit_core::internals::host::Instant;
-use kmcfit_core::internals::solvers::{IterationEvent, IterationRecord, Observer};
+use kmcfit_core::assessment::{Doubt, VerdictLevel};
+use kmcfit_core::host::Instant;
+use kmcfit_core::solvers::{IterationEvent, IterationRecord, Observer};
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};

@@ -30,7 +30,7 @@ use crate::report::Run;
 use clap::{CommandFactory, Parser, Subcommand};
 use environment::check_arithmetic;
 pub use environment::provide_host;
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::solvers::Status;
 use output::{complain, print, say};
 use overrides::Overrides;
 use std::ffi::OsString;

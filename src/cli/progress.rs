@@ -2,7 +2,7 @@
 
 use crate::escape::harmless;
 use indicatif::{ProgressBar, ProgressStyle};
-use kmcfit_core::internals::solvers::IterationEvent;
+use kmcfit_core::solvers::IterationEvent;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The line of the current stage, for the jobs of the numerics.

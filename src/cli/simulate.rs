@@ -8,7 +8,7 @@ use crate::error::InputError;
 use crate::report::{CsvTable, json};
 use crate::results::write_together;
 use crate::text_io::{quote, read_text};
-use kmcfit_core::internals::record::Experiment;
+use kmcfit_core::record::Experiment;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -10,7 +10,7 @@ use crate::error::InputError;
 use crate::report::study::{StudiedFit, StudyDocument};
 use crate::report::{Run, json};
 use crate::results::OutputFolder;
-use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::problem::Problem;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -112,7 +112,7 @@ fn studied(
 
 /// The model, if its fit simulates a response and has parameters.
 fn checked(file: &ModelFile, model: Model) -> Result<Model, InputError> {
-    use kmcfit_core::internals::solvers::Solver;
+    use kmcfit_core::solvers::Solver;
     match model.settings.solver {
         Solver::EquationError => Err(file
             .error_at(

@@ -8,11 +8,11 @@ use crate::report::study::{
     self, AnalysisFailure, COMPLETE, Optimum, StudiedFit, StudyDocument, structural_rank,
 };
 use crate::results::OutputFolder;
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::Status;
-use kmcfit_core::internals::study::extremes::is_within_rounding;
-use kmcfit_core::internals::threads::interruptible;
+use kmcfit_core::objective::Evaluation;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::Status;
+use kmcfit_core::study::is_within_rounding;
+use kmcfit_core::threads::interruptible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

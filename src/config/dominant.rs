@@ -1,7 +1,7 @@
 //! Oscillation of a channel: dominant frequency, drift and decay, from its samples alone.
 
-use kmcfit_core::internals::diagnostics::{detrended, offset_and_drift, outlier_indices};
-use kmcfit_core::internals::signal::{Spectrum, median, spikes};
+use kmcfit_core::diagnostics::{detrended, offset_and_drift, outlier_indices};
+use kmcfit_core::signal::{Spectrum, median, spikes};
 use std::f64::consts::TAU;
 
 /// Fewest periods for a test of drift, and the share of the variance that a straight line must explain; for an

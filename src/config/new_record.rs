@@ -6,8 +6,8 @@ use super::scaffold::{ColumnAssignment, Role, recognised};
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
 use crate::text_io::quote;
-use kmcfit_core::internals::record::{BaseMotion, ChannelKind, Input, Waveform};
-use kmcfit_core::internals::signal::{Signal, median_spacing};
+use kmcfit_core::record::{BaseMotion, ChannelKind, Input, Waveform};
+use kmcfit_core::signal::{Signal, median_spacing};
 use std::path::{Path, PathBuf};
 
 /// Inputs over a span of time, and measurements in the same files.

@@ -5,11 +5,11 @@ use super::lowering::sensor_of;
 use super::scaffold::Role;
 use crate::tables::{ColumnName, Table};
 use crate::units::ScaledUnit;
-use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::signal::Interpolation;
 use kmcfit_core::model::{
     ColumnId, ColumnRef, DelayValue, ExperimentSpec, ScalarOr, ScalarSpec, SensorSpec,
 };
+use kmcfit_core::record::ChannelKind;
+use kmcfit_core::signal::Interpolation;
 
 /// Settings of the first record of a run with a given input; those of an ideal sensor by default.
 #[derive(Debug, Clone, Default)]

@@ -5,7 +5,7 @@ use super::folder::FleetFolder;
 use super::records::{FleetRecord, RecordList};
 use crate::config::ModelFile;
 use crate::error::InputError;
-use kmcfit_core::internals::threads::{map, sharing};
+use kmcfit_core::threads::{map, sharing};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -5,7 +5,7 @@
 //! 2. [`choosing`]: choice of method, basis and constraints for a record; failures of fits and their remedies.
 //! 3. [`theory`]: the equations of system, cost, adjoints and Gauss–Newton, and identifiability.
 //!
-//! Programs in Rust use [`builder`](kmcfit_core::internals::builder); [`Run`](crate::Run)
+//! Programs in Rust use [`builder`](kmcfit_core::builder); [`Run`](crate::Run)
 //! loads results back.
 //!
 //! The pages are those of `docs/`, their equations turned into MathML, which browsers draw by themselves.

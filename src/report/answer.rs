@@ -4,9 +4,9 @@ use super::document::ResultDocument;
 use super::ratios;
 use super::text::aligned_to;
 use crate::number_format::{resolved, significant};
-use kmcfit_core::internals::assessment::{Doubt, Estimate, EstimateStatus};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::ClassificationKind;
+use kmcfit_core::assessment::{Doubt, Estimate, EstimateStatus};
+use kmcfit_core::identifiability::ClassificationKind;
+use kmcfit_core::structure::CoefficientKind;
 use std::fmt;
 
 /// Half-width of an interval, relative to the estimate, below which it is not printed: samples without noise.

@@ -7,12 +7,12 @@ use super::run::FittedModel;
 use super::{doubts, findings};
 use crate::finding::Finding;
 use crate::number_format::resolved;
-use kmcfit_core::internals::assessment::{Doubt, FunctionSummary, Severity, function_summaries};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::{
+use kmcfit_core::assessment::{Doubt, FunctionSummary, Severity, function_summaries};
+use kmcfit_core::identifiability::{
     Classification, FunctionClassification, Target, structural_rank,
 };
-use kmcfit_core::internals::problem::Jumps;
+use kmcfit_core::problem::Jumps;
+use kmcfit_core::structure::CoefficientKind;
 use std::collections::BTreeMap;
 
 impl FittedModel<'_> {

@@ -1,9 +1,9 @@
 //! Assumptions of a model besides its samples, as text.
 
 use crate::config::Model;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Experiment};
+use kmcfit_core::functions::{Basis, CoefficientFunction};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Experiment};
 
 /// Assumptions: records, fixed functions, bases with few parameters, constraints, smoothness.
 pub fn assumptions(model: &Model) -> Vec<String> {

@@ -6,9 +6,9 @@ use super::figures;
 use super::record_figures::{self, InputSeries, SeriesPair, frequency_response, spectrum};
 use crate::config::ChannelNote;
 use crate::units::Unit;
-use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, Whiteness};
-use kmcfit_core::internals::record::{Channel, Weighting};
-use kmcfit_core::internals::signal::even_spacing;
+use kmcfit_core::diagnostics::{ResidualDiagnostics, Whiteness};
+use kmcfit_core::record::{Channel, Weighting};
+use kmcfit_core::signal::even_spacing;
 
 /// Size of residuals relative to the samples below which they are rounding errors.
 const ROUNDING: f64 = 1e-10;

@@ -1,7 +1,8 @@
 //! Column headers of functions, ratios and parameters in the tables of a run: name and unit, and `_lo95` and `_hi95` for the ends of a
 //! 95 % interval.
 
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Ratio};
+use kmcfit_core::functions::{CoefficientFunction, Ratio};
+use kmcfit_core::structure::CoefficientKind;
 
 /// Headers of the lower and the upper end of the 95 % interval of a column.
 pub(super) fn interval_columns(column: &str) -> [String; 2] {

@@ -5,10 +5,10 @@ use super::fit_assessment::RunAssessment;
 use super::run::{FittedModel, RequestedFiles, json};
 use crate::config::Model;
 use crate::fitting::ModelFit;
-use kmcfit_core::internals::functions::CoefficientFunction;
-use kmcfit_core::internals::solvers::{Fit, WeightPath};
-use kmcfit_core::internals::study::predict;
-use kmcfit_core::internals::system::State;
+use kmcfit_core::functions::CoefficientFunction;
+use kmcfit_core::solvers::{Fit, WeightPath};
+use kmcfit_core::study::predict;
+use kmcfit_core::system::State;
 
 /// A coefficient over the record.
 #[derive(Debug, Clone, PartialEq)]

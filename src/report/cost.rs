@@ -1,10 +1,11 @@
 //! Definition of the cost J of a problem: kind of the misfit, and the formula as text.
 
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{CoefficientKind, Penalty, Prior};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Loss;
-use kmcfit_core::internals::solvers::{EquationForm, Solver};
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{Penalty, Prior};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::Loss;
+use kmcfit_core::solvers::{EquationForm, Solver};
+use kmcfit_core::structure::CoefficientKind;
 use serde::{Deserialize, Serialize};
 
 /// Kind of the misfit in J.

@@ -4,11 +4,11 @@ use super::suggestions::percent;
 use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{count, resolved, significant, times_in_words};
-use kmcfit_core::internals::assessment::{
+use kmcfit_core::assessment::{
     ClassicalEstimate, ClassicalMethod, CoarseBasis, Doubt, Implausible, RecordError, Unidentified,
 };
-use kmcfit_core::internals::identifiability::span_words;
-use kmcfit_core::internals::record::ScoreCovariance;
+use kmcfit_core::identifiability::span_words;
+use kmcfit_core::record::ScoreCovariance;
 
 /// A doubt about a fit as a clause.
 pub fn doubt(doubt: &Doubt) -> Finding {

@@ -2,7 +2,7 @@
 
 use super::answer::in_words;
 use crate::number_format::significant;
-use kmcfit_core::internals::solvers::{EquationBalance, EquationForm};
+use kmcfit_core::solvers::{EquationBalance, EquationForm};
 
 /// The residual and its share of each force, the largest force first; per unit of an unknown mass they are accelerations.
 pub(super) fn equation_residual(
@@ -41,7 +41,7 @@ pub(super) fn equation_residual(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::solvers::EquationShare;
+    use kmcfit_core::solvers::EquationShare;
 
     #[test]
     fn the_residual_is_a_share_of_each_force() {

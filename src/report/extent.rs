@@ -3,7 +3,7 @@
 use super::document::ResultDocument;
 use super::suggestions::percent;
 use crate::number_format::{count, significant};
-use kmcfit_core::internals::assessment::POOR;
+use kmcfit_core::assessment::POOR;
 
 /// Number of samples, of several records with their number, and duration, of several records the longest; samples for validation apart.
 pub(super) fn extent(document: &ResultDocument) -> String {

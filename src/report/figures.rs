@@ -2,10 +2,10 @@
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::number_format::at_most;
-use kmcfit_core::internals::functions::{Ratio, WeightRule};
-use kmcfit_core::internals::signal::{even_spacing, median};
-use kmcfit_core::internals::solvers::{PathPoint, WeightPath};
-use kmcfit_core::internals::study::PredictedResponse;
+use kmcfit_core::functions::{Ratio, WeightRule};
+use kmcfit_core::signal::{even_spacing, median};
+use kmcfit_core::solvers::{PathPoint, WeightPath};
+use kmcfit_core::study::PredictedResponse;
 
 /// Number of samples beyond which the dots are smaller.
 const MANY: usize = 400;

@@ -2,11 +2,9 @@
 
 use crate::finding::Finding;
 use crate::number_format::{count, resolved, significant};
-use kmcfit_core::internals::assessment::NoIntervals;
-use kmcfit_core::internals::identifiability::{
-    Classification, FunctionClassification, RankFinding,
-};
-use kmcfit_core::internals::study::multistart;
+use kmcfit_core::assessment::NoIntervals;
+use kmcfit_core::identifiability::{Classification, FunctionClassification, RankFinding};
+use kmcfit_core::study::MultistartFinding;
 
 /// A finding on the structural rank.
 pub fn rank(finding: &RankFinding) -> Finding {
@@ -98,8 +96,8 @@ pub fn jumps(name: &str, unit: &str, times: &[f64], levels: &[(f64, Option<[f64;
 }
 
 /// A finding of a multistart search with this number of starting points.
-pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Finding {
-    use multistart::MultistartFinding as Starts;
+pub fn of_starts(finding: &MultistartFinding, starts: usize) -> Finding {
+    use MultistartFinding as Starts;
     match finding {
         Starts::NoMinimum => {
             let text = format!("no fit from the {starts} starting points converged to a minimum");

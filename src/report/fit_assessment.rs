@@ -2,19 +2,19 @@
 
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
-use kmcfit_core::internals::assessment::{
+use kmcfit_core::assessment::{
     Doubt, EquationErrorIntervals, EstimateErrors, FitAssessment, NoIntervals, POOR, Parts,
-    StepCheck, all_diagnostics,
+    StepCheck,
 };
-use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
-use kmcfit_core::internals::identifiability::{Bands, Quantities};
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{
+use kmcfit_core::diagnostics::ResidualDiagnostics;
+use kmcfit_core::identifiability::{Bands, Quantities};
+use kmcfit_core::objective::{Evaluation, all_diagnostics};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{
     EquationBalance, Fit, MissingTerm, Solver, Status, equation_balance, missing_terms,
     predict_validation,
 };
-use kmcfit_core::internals::step::SimulationError;
+use kmcfit_core::step::SimulationError;
 
 /// Assessment of a fit, computed once for all its documents.
 #[derive(Debug, Clone)]

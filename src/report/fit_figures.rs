@@ -6,10 +6,10 @@ use super::document::ResultDocument;
 use super::figures::{self, FunctionCurve};
 use super::record_figures::{self, InputSeries};
 use super::tables::FUNCTION_ROWS;
-use kmcfit_core::internals::identifiability::{Band, Bands};
-use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::threads::{analyses_at_once, both, map};
+use kmcfit_core::identifiability::{Band, Bands};
+use kmcfit_core::record::ChannelKind;
+use kmcfit_core::solvers::IterationRecord;
+use kmcfit_core::threads::{analyses_at_once, both, map};
 
 /// Figures that both page and files have, drawn once.
 #[derive(Debug, Clone)]

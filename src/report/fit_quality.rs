@@ -3,10 +3,11 @@
 use super::channel_view::{ChannelView, whiteness};
 use super::document::{ChannelSummary, IgnoredSummary, NoiseSummary, ValidationSummary};
 use super::fit_assessment::ValidationRecord;
-use kmcfit_core::internals::assessment::{outliers, pattern};
-use kmcfit_core::internals::identifiability::Quantities;
-use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
-use kmcfit_core::internals::record::{Loss, Weighting};
+use kmcfit_core::assessment::pattern;
+use kmcfit_core::identifiability::Quantities;
+use kmcfit_core::noise::{Correlation, CorrelationLaw};
+use kmcfit_core::objective::outliers;
+use kmcfit_core::record::{Loss, Weighting};
 
 /// One channel with its predictions, and the samples between the rows of its table.
 pub fn channel(view: &ChannelView, samples_per_row: usize) -> ChannelSummary {

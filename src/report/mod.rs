@@ -63,7 +63,7 @@ pub use completed_fit::{CoefficientCurve, CompletedFit, model_predictions};
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use fit_assessment::RunAssessment;
-pub use kmcfit_core::internals::study::{PredictedResponse, predict};
+pub use kmcfit_core::study::{PredictedResponse, predict};
 pub use overview::overview;
 pub use prediction::{ForcedPredictions, ForcedSummary, FreePredictions, Score};
 pub use result_table::ResultTable;

@@ -5,13 +5,13 @@ use super::model_assumptions::assumed_units;
 use crate::config::{ChannelNote, Model};
 use crate::finding::Finding;
 use crate::number_format::significant;
-use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::functions::{CoefficientFunction, Ratio};
-use kmcfit_core::internals::identifiability::{ScalingAmbiguity, Sensitivity, structural_rank};
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::record::{Channel, Experiment};
-use kmcfit_core::internals::signal::{Spectrum, median_spacing};
-use kmcfit_core::internals::solvers::FEW_PARAMETERS;
+use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::functions::{CoefficientFunction, Ratio};
+use kmcfit_core::identifiability::{ScalingAmbiguity, Sensitivity, structural_rank};
+use kmcfit_core::objective::Evaluation;
+use kmcfit_core::problem::FEW_PARAMETERS;
+use kmcfit_core::record::{Channel, Experiment};
+use kmcfit_core::signal::{Spectrum, median_spacing};
 
 /// Largest deviation of distances from multiples of the median one, relative to it, of regular samples with gaps: rounded times have some.
 const REGULAR: f64 = 0.05;

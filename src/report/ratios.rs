@@ -1,6 +1,6 @@
 //! Names and units of the coefficients of a system of unknown mass: their ratios to it.
 
-use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::structure::CoefficientKind;
 
 /// End of the name of a ratio.
 const OVER_MASS: &str = "_over_m";

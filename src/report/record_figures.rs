@@ -2,8 +2,8 @@
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::number_format::count;
-use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
-use kmcfit_core::internals::signal::{Mobility, Spectrum};
+use kmcfit_core::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
+use kmcfit_core::signal::{Mobility, Spectrum};
 
 /// Coherence below which a measured frequency response is noise and does not widen its axis.
 const COHERENT: f64 = 0.5;

@@ -2,7 +2,7 @@
 
 use crate::number_format::significant;
 use crate::report::text::and_list;
-use kmcfit_core::internals::assessment::AmplitudeRival;
+use kmcfit_core::assessment::AmplitudeRival;
 
 /// Difference of BIC beyond which the rival is favoured.
 const FAVOURED: f64 = -10.0;

@@ -16,15 +16,16 @@ use super::ratios;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
-use kmcfit_core::internals::assessment::Estimate;
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
-use kmcfit_core::internals::host::Instant;
-use kmcfit_core::internals::identifiability::{Bands, Quantities};
-use kmcfit_core::internals::solvers::{
+use kmcfit_core::assessment::Estimate;
+use kmcfit_core::functions::{CoefficientFunction, WeightRule};
+use kmcfit_core::host::Instant;
+use kmcfit_core::identifiability::{Bands, Quantities};
+use kmcfit_core::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
-use kmcfit_core::internals::system::Excitation;
-use kmcfit_core::internals::threads::{analyses_at_once, map};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::Excitation;
+use kmcfit_core::threads::{analyses_at_once, map};
 use std::io;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;

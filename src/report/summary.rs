@@ -10,9 +10,9 @@ use super::rule_names::rule_in_words;
 use super::suggestions::percent;
 use crate::finding::Finding;
 use crate::number_format::{count, resolved, significant};
-use kmcfit_core::internals::assessment::ClassicalEstimate;
-use kmcfit_core::internals::functions::WeightRule;
-use kmcfit_core::internals::identifiability::Quantity;
+use kmcfit_core::assessment::ClassicalEstimate;
+use kmcfit_core::functions::WeightRule;
+use kmcfit_core::identifiability::Quantity;
 use std::fmt::Write;
 
 /// Width of the interval of a classical frequency, relative to it, beyond which it is not shown.

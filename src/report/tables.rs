@@ -4,10 +4,10 @@ use super::FittedModel;
 use super::columns::{function_column, interval_columns, named_column};
 use super::csv::CsvTable;
 use super::figures::RatioCurves;
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::solvers::FEW_PARAMETERS;
-use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::system::NodalCoefficients;
+use kmcfit_core::functions::Ratio;
+use kmcfit_core::problem::FEW_PARAMETERS;
+use kmcfit_core::solvers::IterationRecord;
+use kmcfit_core::system::NodalCoefficients;
 
 /// Most rows of a table over time.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Wall-clock time of a run by activity.
 
-use kmcfit_core::internals::solvers::Fit;
-use kmcfit_core::internals::step::arithmetic;
+use kmcfit_core::solvers::Fit;
+use kmcfit_core::step::arithmetic;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 

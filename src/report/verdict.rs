@@ -8,13 +8,13 @@ use super::ratios;
 use super::run::FittedModel;
 use super::text::and_list;
 use crate::finding::Finding;
-use kmcfit_core::internals::assessment::{
+use kmcfit_core::assessment::{
     Doubt, Estimate, EstimateStatus, Implausible, Severity, VerdictAssumption, VerdictLevel,
     estimates, verdict_assumptions, verdict_reasons,
 };
-use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::solvers::{EquationBalance, Status};
+use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::functions::Ratio;
+use kmcfit_core::solvers::{EquationBalance, Status};
 
 impl FittedModel<'_> {
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
@@ -296,7 +296,7 @@ pub fn assumption(assumption: &VerdictAssumption) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kmcfit_core::internals::solvers::{EquationForm, EquationShare};
+    use kmcfit_core::solvers::{EquationForm, EquationShare};
 
     #[test]
     fn a_residual_is_judged_beside_the_largest_force() {

@@ -18,7 +18,7 @@ use crate::number_format::count;
 use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
 use crate::units::{Measurand, Unit};
-use kmcfit_core::internals::threads::both;
+use kmcfit_core::threads::both;
 
 /// Most columns: each takes some hundred bytes beside its fields.
 const MOST_COLUMNS: usize = 10_000;

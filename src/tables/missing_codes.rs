@@ -1,7 +1,7 @@
 //! Codes that stand for missing samples in a file: -9999, 9999, -7999, and values that repeat far outside all others.
 
 use super::Table;
-use kmcfit_core::internals::signal::median;
+use kmcfit_core::signal::median;
 
 /// Sizes that loggers and archives write for missing samples.
 const KNOWN: [f64; 11] = [

@@ -9,7 +9,7 @@ use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
 use crate::units::{Measurand, Unit};
-use kmcfit_core::internals::signal::median;
+use kmcfit_core::signal::median;
 
 /// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.
 const SINCE_1970: [(f64, &str); 3] = [(1e11, "ms"), (1e14, "µs"), (1e17, "ns")];

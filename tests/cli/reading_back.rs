@@ -2,7 +2,7 @@
 
 use crate::workbench::{Workbench, column, paper_run};
 use kmcfit::Run;
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::solvers::Status;
 
 #[test]
 fn a_run_equals_its_files() {

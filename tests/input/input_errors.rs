@@ -2,8 +2,8 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit_core::internals::record::InputNoiseKind;
-use kmcfit_core::internals::system::InputQuantity;
+use kmcfit_core::record::InputNoiseKind;
+use kmcfit_core::system::InputQuantity;
 
 /// A forced record of 41 samples over 4 s; line 5 has the sigmas, line 7 a further key.
 const FORCED: &str = "format: 1

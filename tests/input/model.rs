@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
-use kmcfit_core::WeightRule;
+use kmcfit_core::functions::WeightRule;
 use kmcfit_core::model::{
     BasisName, Bound, ByCoefficient, CoefficientSpec, ColumnId, FitMethod, InitialSpec, KnotSpec,
     KnownValue, Nodes, NumberOrColumn, PenaltyKind, PenaltySpec, ScalarOr, ScalarSpec, Shared,
     SigmaValue, StartSpec, WeightChoice,
 };
-use kmcfit_core::{CoefficientKind, GradientKind, Method};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::Method;
 
 pub const FULL: &str = "\
 format: 1

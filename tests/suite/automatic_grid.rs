@@ -7,7 +7,7 @@
 
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, build};
 use kmcfit::fitting::fit_model;
-use kmcfit_core::internals::solvers::{
+use kmcfit_core::solvers::{
     Fit, GridNotice, Observer, Status, fit_on_refined_grids, fit_with_noise, fit_with_noise_watched,
 };
 use rand::{RngExt, SeedableRng};

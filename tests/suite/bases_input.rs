@@ -2,7 +2,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit_core::internals::functions::{Basis, Parameterization};
+use kmcfit_core::functions::{Basis, Parameterization};
 use std::path::PathBuf;
 
 const COLUMN: &str = "t_s,m_kg\n0,1\n2.5,0.8\n10,0.2\n";

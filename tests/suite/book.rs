@@ -14,10 +14,10 @@ mod library {
 use crate::common::pages::{Tour, blocks_in, fresh_clone, output, page};
 use crate::common::{paper_problem, repository};
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::solvers::{FitSettings, Solver, Status, Stopping, fit};
-use kmcfit_core::internals::system::Method;
-use kmcfit_core::internals::threads::{available, map};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::solvers::{FitSettings, Solver, Status, Stopping, fit};
+use kmcfit_core::system::Method;
+use kmcfit_core::threads::{available, map};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -212,10 +212,10 @@ fn the_paper_s_run_depends_on_rounding() {
     let problem = paper_problem(1000, [2.0, 1.0, 1.0]);
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
-        initial: kmcfit_core::internals::solvers::Initial::Functions,
+        initial: kmcfit_core::solvers::Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping: Stopping::exactly(1000),
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     let found = fit(&problem, &problem.functions.start(), &settings, &mut |_| {})

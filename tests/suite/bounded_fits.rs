@@ -2,7 +2,7 @@
 //! linearised equation of motion finds, in double and in extended precision.
 
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, build};
-use kmcfit_core::internals::solvers::{Fit, Status, WeightPath, choose_weight, fit};
+use kmcfit_core::solvers::{Fit, Status, WeightPath, choose_weight, fit};
 
 /// A shipped model with `values` set.
 fn shipped(name: &str, values: &[&str]) -> Model {

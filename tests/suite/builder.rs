@@ -2,13 +2,13 @@
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::tables::Table;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel};
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::model::{BasisName, CoefficientSpec, KnotSpec, ScalarSpec, StartSpec};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Loss, NoiseModel};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::Method;
 use std::path::Path;
 
 /// The columns of a file in `data/`.
@@ -20,7 +20,7 @@ fn columns<const N: usize>(file: &str, names: [&str; N]) -> [Vec<f64>; N] {
     names.map(|name| table.column(name).unwrap().to_vec())
 }
 
-fn from_file(yaml: &str) -> (Problem, kmcfit_core::internals::solvers::FitSettings) {
+fn from_file(yaml: &str) -> (Problem, kmcfit_core::solvers::FitSettings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/built-by-the-test.yaml");
     let model = build(&ModelFile::parse(&path, yaml).unwrap(), BuildMode::Fit).unwrap();
     (model.problem, model.settings)
@@ -34,7 +34,7 @@ fn paper_record() -> Record {
 }
 
 /// Fits of both problems are bit-identical.
-fn same_way(built: &Problem, written: &(Problem, kmcfit_core::internals::solvers::FitSettings)) {
+fn same_way(built: &Problem, written: &(Problem, kmcfit_core::solvers::FitSettings)) {
     let (written, settings) = written;
     assert_eq!(built.start(), written.start());
     let [a, b] = [built, written].map(|p| p.fit_with(settings).unwrap());

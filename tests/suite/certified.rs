@@ -6,8 +6,8 @@
 
 use kmcfit::config::{BuildMode, ModelFile, Override, build};
 use kmcfit::fitting::{ModelFit, fit_model};
-use kmcfit_core::internals::solvers::{Observer, Status};
-use kmcfit_core::internals::threads::{available, map};
+use kmcfit_core::solvers::{Observer, Status};
+use kmcfit_core::threads::{available, map};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;

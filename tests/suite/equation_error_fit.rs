@@ -1,18 +1,15 @@
 //! The method `equation-error`: records under an unmeasured and under a measured excitation.
 
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, Penalty, uniform_knots,
 };
-use kmcfit_core::internals::objective::{GradientKind, SimulatedRecord};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::solvers::{
-    Fit, FitSettings, Initial, Measurements, Solver, Status, Stopping, fit,
-};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{
+use kmcfit_core::objective::{GradientKind, SimulatedRecord};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Measurements, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
 use rand::{RngExt, SeedableRng};
@@ -25,7 +22,7 @@ fn settings() -> FitSettings {
         initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping: Stopping::default(),
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }

@@ -2,8 +2,8 @@
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::fitting::{ModelFit, fit_model};
-use kmcfit_core::internals::assessment::{Doubt, FitAssessment};
-use kmcfit_core::internals::solvers::Observer;
+use kmcfit_core::assessment::{Doubt, FitAssessment};
+use kmcfit_core::solvers::Observer;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -2,8 +2,8 @@
 
 use crate::common;
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit_core::internals::assessment::{Doubt, FitAssessment, verdict_reasons};
-use kmcfit_core::internals::solvers::{Status, fit, fit_with_noise};
+use kmcfit_core::assessment::{Doubt, FitAssessment, verdict_reasons};
+use kmcfit_core::solvers::{Status, fit, fit_with_noise};
 
 /// Roll decay of the ship model KVLCC2 (Alexandersson and Kjellberg 2021, doi
 /// 10.17632/2stvkyngj9.1, CC BY 4.0): the best constant inertia and damping.
@@ -47,9 +47,7 @@ fit: {{method: lbfgs, stop: {{iterations: 200, tolerance: 1e-9}}}}
 }
 
 /// A model of the roll decay: the stiffness is known, the other coefficients and the initial state are estimated.
-fn roll_decay(
-    functions: &str,
-) -> Option<(kmcfit::config::Model, kmcfit_core::internals::solvers::Fit)> {
+fn roll_decay(functions: &str) -> Option<(kmcfit::config::Model, kmcfit_core::solvers::Fit)> {
     let data = common::shared("data")?.join("kvlcc2_21337_decay_25Hz.csv");
     let text = format!(
         "
@@ -80,12 +78,12 @@ functions:
 }
 
 /// Root-mean-square residual in degrees.
-fn rms_degrees(model: &kmcfit::config::Model, run: &kmcfit_core::internals::solvers::Fit) -> f64 {
+fn rms_degrees(model: &kmcfit::config::Model, run: &kmcfit_core::solvers::Fit) -> f64 {
     let channel = &model.problem.experiments[0].channels[0];
     let residuals: Vec<f64> = channel
         .residuals(&run.best.evaluation.predictions[0][0])
         .collect();
-    kmcfit_core::internals::diagnostics::rms(&residuals).to_degrees()
+    kmcfit_core::diagnostics::rms(&residuals).to_degrees()
 }
 
 /// Published linear and quadratic damping give an equivalent damping of 3.26 N m s at 5 degrees; the

@@ -2,10 +2,9 @@
 
 use crate::common;
 use kmcfit::report::predict;
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
-use kmcfit_core::internals::system::quadrature::trapezoid;
-use kmcfit_core::internals::system::{State, System};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::system::{State, System, trapezoid};
 use std::sync::OnceLock;
 
 /// Iteration, J/J0 after it, G^2/G0^2 before it: computed from the formulas of the paper in plain
@@ -72,7 +71,7 @@ fn settings(stopping: Stopping) -> FitSettings {
         initial: Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping,
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }
@@ -176,7 +175,7 @@ fn the_paper_s_optimum_does_not_predict() {
         (-1.0, 0.0, 0.91209, 10.89),
         (-3.3, 1.0, 39.730, 126.9),
     ];
-    let system: System = common::system(2000, kmcfit_core::internals::system::Method::Midpoint);
+    let system: System = common::system(2000, kmcfit_core::system::Method::Midpoint);
     let states: Vec<State> = expected
         .iter()
         .map(|&(displacement, velocity, ..)| State::one(displacement, velocity))

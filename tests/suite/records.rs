@@ -1,10 +1,10 @@
 //! Records in model files, from the YAML text to the estimated constants.
 
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::solvers::{Fit, Status, fit_with_noise};
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System,
 };
 use std::f64::consts::TAU;

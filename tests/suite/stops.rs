@@ -4,9 +4,9 @@ use crate::common::repository;
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::fitting::fit_model;
 use kmcfit::report::{CompletedFit, RequestedFiles};
-use kmcfit_core::internals::assessment::VerdictLevel;
-use kmcfit_core::internals::solvers::Observer;
-use kmcfit_core::internals::threads::interruptible;
+use kmcfit_core::assessment::VerdictLevel;
+use kmcfit_core::solvers::Observer;
+use kmcfit_core::threads::interruptible;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 

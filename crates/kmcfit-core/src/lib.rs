@@ -23,9 +23,11 @@
 //! A system whose mass falls along a line is simulated, and identified from its response:
 //!
 //! ```
-//! use kmcfit_core::{Builder, CoefficientKind, Record, Status};
+//! use kmcfit_core::builder::{Builder, Record};
 //! use kmcfit_core::model::CoefficientSpec;
-//! use kmcfit_core::{Grid, Law, Method, NodalCoefficients, State, Structure, System};
+//! use kmcfit_core::solvers::Status;
+//! use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+//! use kmcfit_core::system::{Grid, Method, NodalCoefficients, State, System};
 //!
 //! // The system: m = 1 - t/50 kg, c = 0, k = 1 N/m, over 25 s.
 //! let grid = Grid::new(0.0, 25.0, 1001).ok_or("a grid")?;
@@ -58,63 +60,29 @@
     clippy::result_large_err,
     reason = "what failed is returned to be used again"
 )]
-mod assessment;
-mod builder;
+pub mod assessment;
+pub mod builder;
 pub mod candidates;
-mod constraints;
-mod diagnostics;
-mod functions;
-mod host;
-mod identifiability;
+pub mod constraints;
+pub mod diagnostics;
+pub mod functions;
+pub mod host;
+pub mod identifiability;
 pub mod model;
-mod noise;
-mod number_format;
-mod objective;
-mod problem;
-mod qp;
-mod record;
+pub mod noise;
+pub mod number_format;
+pub mod objective;
+pub mod problem;
+pub mod qp;
+pub mod record;
 mod rows;
 mod scalar_search;
-mod signal;
-mod simd;
-mod solvers;
+pub mod signal;
+pub mod simd;
+pub mod solvers;
 mod spans;
-mod step;
-mod structure;
-mod study;
-mod system;
-mod threads;
-
-// The public API, by topic. `tests/api.rs` holds it to `api.txt`: it grows only on purpose.
-
-// Problems.
-pub use builder::{BuildError, Builder, ChannelSpec, Record};
-pub use constraints::{Constraint, Shape, TimeHistory};
-pub use functions::{CoefficientKind, Prior, Ratio, WeightRule};
-pub use problem::{Problem, ProblemError};
-pub use record::{ChannelKind, InputNoiseKind, Loss, NoiseModel, Weighting};
-pub use signal::{Interpolation, Signal};
-pub use system::{
-    Excitation, Grid, InputQuantity, Method, NodalCoefficients, StageSamples, State, SupportMotion,
-    System,
-};
-// Simulation and cost.
-pub use objective::{Evaluation, Gradient, GradientKind};
-pub use step::{Cause, Motion, MotionError, SimulationError, Trajectory};
-pub use structure::{Ends, Law, Structure, StructureError};
-// Fits.
-pub use solvers::{
-    Attempt, Fit, FitSettings, Initial, Optimality, Outcome, QpSolver, Reason, SolveCounts, Solver,
-    StartStrategy, Status, Stopping, Timings, WeightPath, choose_weight, fit,
-};
-// Inference.
-pub use assessment::{CoarseBasis, Doubt, FitAssessment, Unidentified};
-pub use identifiability::{
-    Bands, Curve, Quantities, Quantity, Target, classify_functions, structural_rank,
-};
-pub use study::{Profile, ProfileSettings, profile};
-// Services of the host.
-pub use host::{Host, set_host};
-
-#[doc(hidden)]
-pub mod internals;
+pub mod step;
+pub mod structure;
+pub mod study;
+pub mod system;
+pub mod threads;

@@ -4,8 +4,8 @@ use super::ModelKey;
 use super::functions::read_column;
 use crate::config::ModelFile;
 use crate::error::InputError;
-use kmcfit_core::internals::system::Grid;
 use kmcfit_core::model::ConstraintSpec;
+use kmcfit_core::system::Grid;
 
 /// The constraints of the model; bounds of a function are part of its specification.
 pub(super) fn all(

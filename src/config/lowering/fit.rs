@@ -3,10 +3,10 @@
 
 use crate::config::ModelFile;
 use crate::error::InputError;
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, QpSolver, Solver, Stopping};
 use kmcfit_core::model::{FitMethod, StopSpec};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{FitSettings, Initial, QpSolver, Solver, Stopping};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only

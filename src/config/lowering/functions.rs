@@ -4,16 +4,16 @@ use super::ModelKey;
 use super::on_grid::column_on_grid;
 use crate::config::ModelFile;
 use crate::error::InputError;
-use kmcfit_core::internals::builder::UNKNOWN_MASS;
-use kmcfit_core::internals::constraints::TimeHistory;
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::{ScaleSource, scale_source};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::system::{Grid, NodalCoefficients};
+use kmcfit_core::builder::UNKNOWN_MASS;
+use kmcfit_core::constraints::TimeHistory;
+use kmcfit_core::identifiability::{ScaleSource, scale_source};
 use kmcfit_core::model::{
     Bound, ByCoefficient, CoefficientSpec, ColumnSpec, ExperimentSpec, KnownValue, KnownValueMap,
     NumberOrColumn, OneOrList, StartSpec,
 };
+use kmcfit_core::problem::Problem;
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Grid, NodalCoefficients};
 
 /// Default lower limit of a mass, as a share of its smallest start value: a fit can otherwise end with a mass of nearly zero, whose
 /// response follows the force at all frequencies.

@@ -13,9 +13,9 @@ use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory::MOST_NODES_TIMES_PARAMETERS;
 use crate::number_format::significant;
-use kmcfit_core::internals::solvers::FEW_PARAMETERS;
-use kmcfit_core::internals::system::{Grid, Method};
 use kmcfit_core::model::{BasisName, FitMethod, KnotSpec, Nodes};
+use kmcfit_core::problem::FEW_PARAMETERS;
+use kmcfit_core::system::{Grid, Method};
 
 /// Most nodes of an automatic choice: the same on every machine.
 pub(super) const MOST_CHOSEN: usize = 10_000_000;

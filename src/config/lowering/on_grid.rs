@@ -4,7 +4,7 @@ use super::ModelKey;
 use crate::error::InputError;
 use crate::tables::{Table, TableFormat, increasing};
 use crate::units::Measurand;
-use kmcfit_core::internals::system::Grid;
+use kmcfit_core::system::Grid;
 
 /// Column of times in files of functions.
 const TIME_COLUMN: &str = "t_s";

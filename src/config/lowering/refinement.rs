@@ -4,8 +4,8 @@ use super::grid::{FinerNodes, MOST_CHOSEN, stable_nodes, unstable_start, unstabl
 use super::{BuildMode, Known, Model, ReadRecords, build_on};
 use crate::config::ModelFile;
 use crate::error::InputError;
-use kmcfit_core::internals::solvers::Solver;
-use kmcfit_core::internals::system::NodalCoefficients;
+use kmcfit_core::solvers::Solver;
+use kmcfit_core::system::NodalCoefficients;
 use std::sync::Arc;
 
 /// An automatic grid, and the model file from which the model is built on a finer one.

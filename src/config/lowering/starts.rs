@@ -12,11 +12,11 @@ use super::experiments::{RawChannel, RawRecord, is_held_out};
 use super::functions::{self, RecordStarts};
 use crate::config::ModelFile;
 use crate::config::dominant::{Oscillation, decay_ratio, remove_outliers};
-use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::signal::{driven_oscillator, onset};
-use kmcfit_core::internals::system::Grid;
+use kmcfit_core::diagnostics::standard_deviation;
 use kmcfit_core::model::{ColumnSpec, KnownValue, NumberOrColumn, StartSpec};
+use kmcfit_core::signal::{driven_oscillator, onset};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::Grid;
 use std::f64::consts::TAU;
 
 /// Damping ratio of a response that shows none: that of a lightly damped structure.

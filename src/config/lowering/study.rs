@@ -7,15 +7,13 @@ use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::{Curve, Target};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{
-    Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
-};
-use kmcfit_core::internals::study::Choice;
-use kmcfit_core::internals::system::State;
+use kmcfit_core::identifiability::{Curve, Target};
 use kmcfit_core::model::{CandidateSpec, EquivalentSpec, ProfileSpec, StudySpec};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Input, Waveform, Weighting};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::study::Choice;
+use kmcfit_core::system::State;
 
 /// Settings of the analyses of `study`.
 #[derive(Debug, Clone)]
@@ -214,7 +212,7 @@ fn extremes(
 
 fn on_grid(at: &ModelKey<'_>, problem: &Problem, time: f64) -> Result<(), InputError> {
     let grid = &problem.system.grid;
-    match kmcfit_core::internals::system::TimePoint::of(grid, time) {
+    match kmcfit_core::system::TimePoint::of(grid, time) {
         Some(_) => Ok(()),
         None => Err(at
             .error("this time is outside the record")

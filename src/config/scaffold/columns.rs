@@ -7,7 +7,7 @@ use crate::error::InputError;
 use crate::quantity_names::{is_drive, is_foreign};
 use crate::tables::{Duplicates, Table, increasing_at, repeated_times};
 use crate::units::{ScaledUnit, Unit};
-use kmcfit_core::internals::diagnostics::standard_deviation;
+use kmcfit_core::diagnostics::standard_deviation;
 
 /// Ratio of standard deviations beyond which a later sensor replaces an earlier one of the same role.
 const MUCH: f64 = 3.0;

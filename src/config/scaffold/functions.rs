@@ -2,7 +2,7 @@
 
 use super::statements::Statements;
 use super::{FileRecord, Role, commented};
-use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::structure::CoefficientKind;
 
 /// Below the functions: how to let one vary, and what else they can be.
 const OTHERS: &str = "\

@@ -7,8 +7,8 @@ use crate::config::dominant::{Oscillation, remove_outliers, values_of};
 use crate::config::lowering::known_stretches;
 use crate::error::InputError;
 use crate::tables::{Duplicates, RepeatedTimes, Table, lines_in_words, repeated_times};
-use kmcfit_core::internals::signal::{is_kept_up, jumps, median, onset};
-use kmcfit_core::internals::system::round_time;
+use kmcfit_core::signal::{is_kept_up, jumps, median, onset};
+use kmcfit_core::system::round_time;
 
 /// Most lines in a comment.
 const LISTED: usize = 10;

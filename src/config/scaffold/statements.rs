@@ -6,7 +6,7 @@ use crate::spelling::did_you_mean;
 use crate::tables::{ColumnName, Table};
 use crate::text_io::{one_of, quote};
 use crate::units::{Measurand, ScaledUnit, Unit, split_factor};
-use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::structure::CoefficientKind;
 
 /// Remedy for a column of times that cannot be used.
 pub(super) const OTHER_FILE: &str = "if another file has the times, write one table of both: `paste -d, TIMES.csv RECORD.csv > both.csv`";

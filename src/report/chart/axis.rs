@@ -3,7 +3,7 @@
 //! Ranges are in the coordinate in which the axis is uniform: the value itself, or its decimal logarithm.
 
 use crate::report::text;
-use kmcfit_core::internals::signal::Extremes;
+use kmcfit_core::signal::Extremes;
 use std::ops::RangeInclusive;
 
 /// Magnitudes beyond this leave gaps, so that no difference of two values overflows.

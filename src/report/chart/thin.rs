@@ -2,7 +2,7 @@
 
 use super::axis::{Scale, drawable, even, extent};
 use super::plot_mark::{Mark, MarkKind};
-use kmcfit_core::internals::signal::Extremes;
+use kmcfit_core::signal::Extremes;
 
 /// Longest curve that is drawn whole, points.
 const MOST: usize = 4000;

@@ -3,9 +3,9 @@
 use super::ComparedRun;
 use crate::report::chart::{Colour, Dash, Figure, Mark, Panel, Style};
 use crate::report::{ResultTable, Run};
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::structure::Law;
-use kmcfit_core::internals::system::NodalCoefficients;
+use kmcfit_core::functions::Ratio;
+use kmcfit_core::structure::Law;
+use kmcfit_core::system::NodalCoefficients;
 
 /// The figures of a comparison.
 pub(super) fn all(runs: &[ComparedRun]) -> [Option<Figure>; 2] {

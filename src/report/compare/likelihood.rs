@@ -11,7 +11,7 @@
 
 use crate::report::CostKind;
 use crate::report::document::{ChannelSummary, ResultDocument};
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::solvers::Status;
 use serde::Serialize;
 use std::f64::consts::TAU;
 

@@ -4,8 +4,8 @@ use super::ComparedRun;
 use super::likelihood::Likelihood;
 use crate::number_format::{resolved, significant};
 use crate::report::document::level_in_words;
-use kmcfit_core::internals::assessment::{Estimate, TruthErrors, VerdictLevel};
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::assessment::{Estimate, TruthErrors, VerdictLevel};
+use kmcfit_core::solvers::Status;
 use serde::Serialize;
 
 /// Width of an interval, relative to the estimate, below which it is not printed: samples without noise.

@@ -1,9 +1,9 @@
 //! Channels and validation records in the result document.
 
 use super::{is_one, one};
-use kmcfit_core::internals::assessment::ResidualPattern;
-use kmcfit_core::internals::identifiability::Quantity;
-use kmcfit_core::internals::number_format::number_or_nan;
+use kmcfit_core::assessment::ResidualPattern;
+use kmcfit_core::identifiability::Quantity;
+use kmcfit_core::number_format::number_or_nan;
 use serde::{Deserialize, Serialize};
 
 /// One channel of an experiment at the best point, in its own unit.
@@ -21,7 +21,7 @@ pub struct ChannelSummary {
     /// Unused samples.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
-    /// Number of samples rejected as outliers under a robust loss ([`kmcfit_core::internals::diagnostics::outlier_indices`]);
+    /// Number of samples rejected as outliers under a robust loss ([`kmcfit_core::diagnostics::outlier_indices`]);
     /// rms, fit and whiteness are those of the other samples.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub outliers: usize,

@@ -1,6 +1,6 @@
 //! The answer of a fit in the result document: a map from names to estimates in the order of importance.
 
-use kmcfit_core::internals::assessment::Estimate;
+use kmcfit_core::assessment::Estimate;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;

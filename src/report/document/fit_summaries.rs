@@ -1,7 +1,7 @@
 //! Entries of the result document on the fit from each starting point, the path of penalty weights, and each roughness
 //! penalty.
 
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::solvers::Status;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -14,15 +14,15 @@ use crate::config::DataFile;
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
-use kmcfit_core::internals::assessment::{
+use kmcfit_core::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
 };
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::{ClassificationKind, CovarianceKind, Quantity};
-use kmcfit_core::internals::number_format::number_or_nan;
-use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status};
-pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
-use kmcfit_core::internals::system::Grid;
+use kmcfit_core::identifiability::{ClassificationKind, CovarianceKind, Quantity};
+use kmcfit_core::number_format::number_or_nan;
+use kmcfit_core::solvers::{EquationBalance, Optimality, Status};
+use kmcfit_core::structure::CoefficientKind;
+pub use kmcfit_core::study::PredictionSummary as Prediction;
+use kmcfit_core::system::Grid;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! Verdict on a fit in the result document.
 
 use crate::finding::Finding;
-use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::assessment::VerdictLevel;
 use serde::{Deserialize, Serialize};
 
 /// Verdict on a fit.

@@ -6,9 +6,7 @@ use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
 use crate::report::doubts;
 use crate::report::text::decade;
-use kmcfit_core::internals::assessment::{
-    BasisComparison, EXACT, Extension, ExtensionTest, ModelTests,
-};
+use kmcfit_core::assessment::{BasisComparison, EXACT, Extension, ExtensionTest, ModelTests};
 
 /// Step-size check, tests against larger models, and the classical estimates. Empty for a fit without any.
 pub(super) fn checks(document: &ResultDocument) -> String {

@@ -12,7 +12,7 @@ use crate::report::chart::Figure;
 use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::extent::extent;
 use crate::report::text::{and_list, escape, prose};
-use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::assessment::VerdictLevel;
 use std::path::Path;
 
 /// Number of further files from which they are counted and not named.

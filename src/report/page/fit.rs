@@ -14,7 +14,7 @@ use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
 use crate::report::summary;
 use crate::units::{self, Unit};
-use kmcfit_core::internals::identifiability::Quantity;
+use kmcfit_core::identifiability::Quantity;
 
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {

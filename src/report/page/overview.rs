@@ -5,10 +5,10 @@ use crate::number_format::count;
 use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::text::prose;
-use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::identifiability::ClassificationKind;
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::assessment::FunctionSummary;
+use kmcfit_core::functions::Ratio;
+use kmcfit_core::identifiability::ClassificationKind;
+use kmcfit_core::solvers::Status;
 
 /// Status of the solver as a coloured word, and the reason.
 pub(super) fn state(document: &ResultDocument) -> String {

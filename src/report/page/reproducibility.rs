@@ -6,7 +6,7 @@ use crate::escape::shell_quoted;
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
 use crate::report::text::escape;
-use kmcfit_core::internals::step::arithmetic;
+use kmcfit_core::step::arithmetic;
 
 /// The command, versions, overrides, model file and data files.
 pub(super) fn reproducibility(run: &FittedModel, document: &ResultDocument) -> String {

@@ -4,10 +4,10 @@ use super::identified::system_of;
 use crate::number_format::significant;
 use crate::report::chart::Figure;
 use crate::report::{CsvTable, Run, figures, prediction_table};
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::step::SimulationError;
-use kmcfit_core::internals::study::{PredictedResponse, PredictionSummary, predict};
-use kmcfit_core::internals::system::State;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::step::SimulationError;
+use kmcfit_core::study::{PredictedResponse, PredictionSummary, predict};
+use kmcfit_core::system::State;
 use serde::Serialize;
 
 /// Free responses from several initial states.

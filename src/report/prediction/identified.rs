@@ -7,12 +7,13 @@ use crate::report::columns::named_column;
 use crate::report::parameters::{FunctionBasis, ParametersDocument};
 use crate::report::run_reader::at_nodes;
 use crate::units::Unit;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, CoefficientSet, ScalarParameter, ScalarValue,
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, CoefficientSet, ScalarParameter, ScalarValue,
 };
-use kmcfit_core::internals::record::{ChannelKind, Sensor};
-use kmcfit_core::internals::study::IdentifiedSystem;
-use kmcfit_core::internals::system::Grid;
+use kmcfit_core::record::{ChannelKind, Sensor};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::study::IdentifiedSystem;
+use kmcfit_core::system::Grid;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 

@@ -13,10 +13,10 @@ use crate::error::InputError;
 use crate::number_format::significant;
 pub use free::FreePredictions;
 use identified::system_of;
-use kmcfit_core::internals::diagnostics::{rms, standard_deviation};
-use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::study::PredictedChannel;
-use kmcfit_core::internals::system::State;
+use kmcfit_core::diagnostics::{rms, standard_deviation};
+use kmcfit_core::record::ChannelKind;
+use kmcfit_core::study::PredictedChannel;
+use kmcfit_core::system::State;
 use record::{experiment, grid};
 use serde::Serialize;
 

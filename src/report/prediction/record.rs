@@ -4,9 +4,9 @@ use super::identified::SystemOfRun;
 use crate::config::{MeasuredChannel, NewRecord};
 use crate::error::InputError;
 use crate::report::Run;
-use kmcfit_core::internals::functions::ScalarValue;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting};
-use kmcfit_core::internals::system::{Grid, InputSample, State};
+use kmcfit_core::functions::ScalarValue;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting};
+use kmcfit_core::system::{Grid, InputSample, State};
 
 /// Most nodes of a prediction.
 const MOST_NODES: usize = 5_000_000;

@@ -5,10 +5,10 @@ use super::records::{Optimum, finite_numbers};
 use crate::config::Model;
 use crate::number_format::{resolved, significant};
 use crate::report::doubts;
-use kmcfit_core::internals::assessment::Plausibility;
-use kmcfit_core::internals::diagnostics::normal_half_width;
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::identifiability::{
+use kmcfit_core::assessment::Plausibility;
+use kmcfit_core::diagnostics::normal_half_width;
+use kmcfit_core::functions::Ratio;
+use kmcfit_core::identifiability::{
     Band, Bands, Classification, FunctionClassification, Quantity, classify_functions,
 };
 

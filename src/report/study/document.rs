@@ -2,8 +2,8 @@
 
 use crate::finding::Finding;
 use crate::report::document::Verdict;
-use kmcfit_core::internals::solvers::Status;
-use kmcfit_core::internals::study::extremes::ExtremeStatus;
+use kmcfit_core::solvers::Status;
+use kmcfit_core::study::ExtremeStatus;
 use serde::{Deserialize, Serialize};
 
 /// Numbers; an infinite or missing one is `null` in JSON.

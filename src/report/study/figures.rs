@@ -7,7 +7,7 @@ use super::{
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style, sides};
 use crate::report::figures::truth;
 use crate::report::main_figure::variation;
-use kmcfit_core::internals::study::extremes::ExtremeStatus;
+use kmcfit_core::study::ExtremeStatus;
 
 fn gaps(numbers: &Numbers) -> Vec<f64> {
     numbers.iter().map(|x| x.unwrap_or(f64::NAN)).collect()

@@ -3,9 +3,9 @@
 use super::StudiedFit;
 use crate::config::Model;
 use crate::report::{FittedModel, RunAssessment};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Weighting};
-use kmcfit_core::internals::solvers::Fit;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Weighting};
+use kmcfit_core::solvers::Fit;
 
 impl StudiedFit {
     /// The record of a fit of a model.

@@ -23,7 +23,7 @@ use super::page::source_line;
 use super::render;
 use crate::config::Model;
 use crate::results::OutputFolder;
-use kmcfit_core::internals::record::Channel;
+use kmcfit_core::record::Channel;
 use std::io;
 
 /// Status of a study with all its analyses.

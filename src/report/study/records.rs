@@ -4,18 +4,16 @@ use super::document::*;
 use crate::config::Model;
 use crate::finding::Finding;
 use crate::report::findings;
-use kmcfit_core::internals::diagnostics::chi_square_one;
-use kmcfit_core::internals::identifiability::{
-    self, ScalingAmbiguity, Sensitivity, Target, rank_experiments,
+use kmcfit_core::diagnostics::chi_square_one;
+use kmcfit_core::identifiability::{
+    Ranked, ScalingAmbiguity, Sensitivity, Target, rank_experiments,
 };
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Experiment;
-use kmcfit_core::internals::study::extremes::{Extreme, MisfitLimit, envelopes};
-use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
-use kmcfit_core::internals::study::profile_likelihood::{Interval, ProfileSettings};
-use kmcfit_core::internals::study::{
-    Choice, EquivalentSystem, equivalent_systems, prediction, profile,
+use kmcfit_core::objective::Evaluation;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::Experiment;
+use kmcfit_core::study::{
+    Choice, Cluster, EquivalentSystem, Extreme, Interval, MisfitLimit, Multistart, PredictionCase,
+    ProfileSettings, Ranges, envelopes, equivalent_systems, multistart, profile,
 };
 
 /// Most unidentifiable combinations in the document.
@@ -23,7 +21,7 @@ const NAMED: usize = 400;
 
 /// Findings on the structural rank of a problem, the rank bound first.
 pub fn structural_rank(problem: &Problem) -> Vec<Finding> {
-    let count = identifiability::structural_rank(problem);
+    let count = kmcfit_core::identifiability::structural_rank(problem);
     let bound = Finding::new("rank_bound", count.headline());
     let bound = bound.with("rank_bound", count.rank_bound);
     let bound = bound.with("parameters", count.parameters);
@@ -98,7 +96,7 @@ pub fn profile_of(at: Optimum, of: &Target, model: &Model) -> Result<ProfileReco
 pub fn candidates(at: Optimum, list: &[Experiment]) -> Vec<CandidateRecord> {
     let ranked = rank_experiments(at.problem, at.theta, at.evaluation, list);
     let finite = |ratio: f64| ratio.is_finite().then_some(ratio);
-    let record = |r: identifiability::Ranked| {
+    let record = |r: Ranked| {
         let gain = r.gain.as_ref().ok();
         CandidateRecord {
             text: r.sentence(),
@@ -139,11 +137,11 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartRecord {
         threads,
         settings: model.settings.clone(),
     };
-    let waterfall = multistart::multistart(problem, &how);
+    let waterfall = multistart(problem, &how);
     let clusters = waterfall.clusters(problem, plan.merge_tolerance);
     let findings = waterfall.findings(problem, at.theta, &clusters);
     let failed = waterfall.runs.iter().filter(|run| run.found.is_none());
-    let cluster = |c: &multistart::Cluster| ClusterRecord {
+    let cluster = |c: &Cluster| ClusterRecord {
         starts: c.members.len(),
         cost: c.cost,
     };
@@ -199,19 +197,15 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
     let covariance = at.problem.covariance_of_estimates(at.theta, at.evaluation);
     let free = model.predictions.iter().map(|state| {
         let (y, v) = (state.displacement(0), state.velocity(0));
-        prediction::PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), state.clone())
+        PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), state.clone())
     });
-    let candidates = model
-        .study
-        .candidates
-        .iter()
-        .map(|c| prediction::PredictionCase {
-            excitation: c.excitation.clone(),
-            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.initial.clone())
-        });
+    let candidates = model.study.candidates.iter().map(|c| PredictionCase {
+        excitation: c.excitation.clone(),
+        ..PredictionCase::free(format!("`{}`", c.name), c.initial.clone())
+    });
     let each = free.chain(candidates).filter_map(|run| {
         let covariance = covariance.as_ref();
-        let found = prediction::predict(at.problem, at.theta, &run, covariance, extremes).ok()?;
+        let found = (run.predict(at.problem, at.theta, covariance, extremes)).ok()?;
         Some(PredictionRecord {
             name: found.name,
             times: found.times,

@@ -7,8 +7,7 @@ use super::{
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
 use crate::report::chart::Figure;
-use kmcfit_core::internals::study::extremes::ExtremeStatus;
-use kmcfit_core::internals::study::prediction::BOUNDED;
+use kmcfit_core::study::{BOUNDED, ExtremeStatus};
 
 /// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;

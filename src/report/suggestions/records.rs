@@ -4,11 +4,11 @@ use super::{Suggestion, of_channel, position, written};
 use crate::config::Model;
 use crate::number_format::significant;
 use crate::report::document::ResultDocument;
-use kmcfit_core::internals::assessment::{Doubt, RecordError};
-use kmcfit_core::internals::functions::ScalarValue;
-use kmcfit_core::internals::record::{BaseMotion, Waveform};
-use kmcfit_core::internals::signal::{Interpolation, Signal};
-use kmcfit_core::internals::system::InputQuantity;
+use kmcfit_core::assessment::{Doubt, RecordError};
+use kmcfit_core::functions::ScalarValue;
+use kmcfit_core::record::{BaseMotion, Waveform};
+use kmcfit_core::signal::{Interpolation, Signal};
+use kmcfit_core::system::InputQuantity;
 
 /// Delays, in samples, like that of an input held between its samples.
 const HALF_SAMPLE: std::ops::RangeInclusive<f64> = 0.4..=0.6;

@@ -4,9 +4,9 @@ use super::{Suggestion, is_poor, of_channel, percent};
 use crate::config::Model;
 use crate::number_format::{significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
-use kmcfit_core::internals::assessment::{BEYOND_SIGMA, Doubt, EXACT, POOR, ResidualPattern};
-use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
-use kmcfit_core::internals::solvers::StartStrategy;
+use kmcfit_core::assessment::{BEYOND_SIGMA, Doubt, EXACT, POOR, ResidualPattern};
+use kmcfit_core::diagnostics::SIGNIFICANCE;
+use kmcfit_core::solvers::StartStrategy;
 
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;

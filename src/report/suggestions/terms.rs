@@ -2,7 +2,7 @@
 
 use super::{Suggestion, written};
 use crate::report::document::ResultDocument;
-use kmcfit_core::internals::assessment::Doubt;
+use kmcfit_core::assessment::Doubt;
 
 /// Shift of the estimates by half the width of Coulomb friction at which a smaller one aims, in standard errors.
 const WIDTH_SHIFT: f64 = 0.06;

@@ -2,7 +2,7 @@
 
 use kmcfit::config::{ModelFile, Source, Statements, scaffold};
 use kmcfit::error::InputError;
-use kmcfit_core::internals::host::{Host, set_host};
+use kmcfit_core::host::{Host, set_host};
 use std::cell::RefCell;
 use std::time::Duration;
 

@@ -39,11 +39,10 @@ mod step_check;
 mod variation;
 mod verdict;
 
-pub use crate::objective::{all_diagnostics, outliers};
 pub use assumptions::{VerdictAssumption, verdict_assumptions};
 pub use channel::{ResidualPattern, pattern};
 pub use classical::{ClassicalEstimate, ClassicalMethod};
-pub use constants::constant_probability;
+pub(crate) use constants::constant_probability;
 pub use doubt::{Doubt, Severity, Unidentified};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
@@ -57,8 +56,10 @@ pub use record_error::RecordError;
 pub use recovery::TruthErrors;
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
-pub use statistics::{FitStatistics, statistics};
-pub use step_check::{StepCheck, StepCheckOutcome};
+pub use statistics::FitStatistics;
+pub(crate) use statistics::statistics;
+pub use step_check::StepCheck;
+pub(crate) use step_check::StepCheckOutcome;
 pub use verdict::{VerdictLevel, verdict_reasons};
 
 pub(crate) use extension::{extended, with_functions};

@@ -1,11 +1,12 @@
 //! Lowering of a builder to a problem: grid, functions, records, penalties, constraints and start.
 
 use super::coefficient_sets::{CoefficientSets, FunctionEntry};
-use super::constraints::of_bounds;
+use super::constraints::{RowKey, move_start, of_bounds};
 use super::experiment::ExperimentBuilder;
-use super::{BuildError, BuildNotice, Builder, Built, Record, identifiable, input_error};
-use crate::functions::Parameterization;
+use super::{BuildError, BuildNotice, Builder, Record, WeightSearch, identifiable, input_error};
+use crate::functions::{Parameterization, ScalarParameter};
 use crate::problem::Problem;
+use crate::record::Experiment;
 use crate::signal::even_spacing;
 use crate::solvers::{Measurements, estimate_states};
 use crate::structure::{Law, Structure};
@@ -14,6 +15,32 @@ use std::sync::Arc;
 
 /// Largest number of nodes, a safeguard against mistyped numbers.
 const MOST_NODES: usize = 100_000_000;
+
+/// A problem with its notices, before the projection of its start onto the constraints.
+#[derive(Debug, Clone)]
+pub struct Built {
+    /// The problem.
+    pub problem: Problem,
+    /// Validation records, each with its own estimated scalars.
+    pub validation: Vec<(Experiment, Vec<ScalarParameter>)>,
+    /// Weights to be chosen by a rule.
+    pub weight_search: Option<WeightSearch>,
+    /// Notices on the specification.
+    pub notices: Vec<BuildNotice>,
+    rows: Vec<RowKey>,
+}
+
+impl Built {
+    /// Projects the start onto the constraints.
+    ///
+    /// # Errors
+    /// If the constraints contradict each other, or no feasible start is found.
+    pub fn move_start(&mut self) -> Result<(), BuildError> {
+        let notice = move_start(&mut self.problem, &self.rows)?;
+        self.notices.extend(notice);
+        Ok(())
+    }
+}
 
 impl Builder {
     /// Lowers the specification to a problem, with the start as given, before its projection onto the constraints.

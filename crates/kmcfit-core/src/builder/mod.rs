@@ -6,7 +6,8 @@
 //!
 //! ```
 //! use kmcfit_core::model::CoefficientSpec;
-//! use kmcfit_core::{Builder, CoefficientKind, Record};
+//! use kmcfit_core::builder::{Builder, Record};
+//! use kmcfit_core::structure::CoefficientKind;
 //!
 //! // A free decay of one second: m = 1 kg, c = 2 N s/m, k = 2500 N/m, so 8 Hz.
 //! let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
@@ -49,18 +50,17 @@ mod variations;
 pub use coefficient::UNKNOWN_MASS;
 pub use constraints::listed;
 pub use error::{BuildError, Contradiction};
-pub use notice::BuildNotice;
+pub(crate) use notice::BuildNotice;
 pub use penalties::WeightSearch;
 pub use record::{ChannelSpec, Record};
 
 use crate::constraints::Constraint;
-use crate::functions::{CoefficientKind, ScalarParameter};
+use crate::functions::CoefficientKind;
 use crate::model::{CoefficientSpec, ConstraintSpec};
 use crate::problem::Problem;
-use crate::record::Experiment;
 use crate::solvers::Solver;
 use crate::system::{Grid, Method, State};
-use constraints::{RowKey, StatedConstraint, move_start};
+use constraints::StatedConstraint;
 
 /// Specification of a problem.
 #[derive(Debug, Clone)]
@@ -75,32 +75,6 @@ pub struct Builder {
     constraints: Vec<StatedConstraint>,
     /// States at the first node, for initial states without a start; estimated from the samples where empty.
     states: Vec<State>,
-}
-
-/// A problem with its notices, before the projection of its start onto the constraints.
-#[derive(Debug, Clone)]
-pub struct Built {
-    /// The problem.
-    pub problem: Problem,
-    /// Validation records, each with its own estimated scalars.
-    pub validation: Vec<(Experiment, Vec<ScalarParameter>)>,
-    /// Weights to be chosen by a rule.
-    pub weight_search: Option<WeightSearch>,
-    /// Notices on the specification.
-    pub notices: Vec<BuildNotice>,
-    rows: Vec<RowKey>,
-}
-
-impl Built {
-    /// Projects the start onto the constraints.
-    ///
-    /// # Errors
-    /// If the constraints contradict each other, or no feasible start is found.
-    pub fn move_start(&mut self) -> Result<(), BuildError> {
-        let notice = move_start(&mut self.problem, &self.rows)?;
-        self.notices.extend(notice);
-        Ok(())
-    }
 }
 
 impl Builder {
@@ -279,7 +253,7 @@ impl Builder {
     /// Builds the problem, with its start projected onto the constraints.
     ///
     /// # Errors
-    /// The first invalid part; also a weight chosen by a rule, which requires [`choose_weight`](crate::choose_weight).
+    /// The first invalid part; also a weight chosen by a rule, which requires [`choose_weight`](crate::solvers::choose_weight).
     pub fn build(&self) -> Result<Problem, BuildError> {
         let empty = self.records.iter().position(|r| r.channels.is_empty());
         match empty {

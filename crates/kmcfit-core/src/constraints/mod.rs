@@ -8,6 +8,8 @@ mod soft;
 mod violation;
 
 pub use crate::rows::Rows;
-pub use kinds::{Constraint, ConstraintError, Shape, TimeHistory};
-pub use set::{Cone, ConeGroup, Constraints, RowGroup};
+pub(crate) use kinds::ConstraintError;
+pub use kinds::{Constraint, Shape, TimeHistory};
+pub(crate) use set::ConeGroup;
+pub use set::{Cone, Constraints, RowGroup};
 pub use violation::TOLERANCE;

@@ -13,14 +13,15 @@ mod residuals;
 mod whiteness;
 mod words;
 
-pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
-pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
+pub(crate) use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
+pub(crate) use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
 pub(crate) use pattern::median_size;
 pub use pattern::{offset_and_drift, outlier_indices};
 pub use quantiles::{chi_square_one, normal_half_width, student_half_width};
-pub use record::{ResidualDiagnostics, ResidualRecord};
+pub use record::ResidualDiagnostics;
+pub(crate) use record::ResidualRecord;
+pub(crate) use residuals::fit_percent;
+pub use residuals::rms;
 pub use residuals::{detrended, standard_deviation};
-pub use residuals::{fit_percent, rms};
-pub use whiteness::{
-    FEWEST_SAMPLES, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult, whiteness,
-};
+pub(crate) use whiteness::{FEWEST_SAMPLES, UntestedReason, WhitenessResult, whiteness};
+pub use whiteness::{SIGNIFICANCE, Whiteness};

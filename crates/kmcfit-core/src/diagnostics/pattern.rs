@@ -18,7 +18,7 @@ const FEWEST: usize = 16;
 /// sample in twenty, and at most three are consecutive. Empty otherwise.
 ///
 /// ```
-/// use kmcfit_core::internals::diagnostics::outlier_indices;
+/// use kmcfit_core::diagnostics::outlier_indices;
 /// let mut residuals: Vec<f64> = (0..100).map(|i| (0.7 * f64::from(i)).sin()).collect();
 /// residuals[30] = 80.0;
 /// assert_eq!(outlier_indices(&residuals), [30]);
@@ -59,7 +59,7 @@ pub fn outlier_indices(residuals: &[f64]) -> Vec<usize> {
 /// and 0 for fewer than 16 residuals.
 ///
 /// ```
-/// use kmcfit_core::internals::diagnostics::offset_and_drift;
+/// use kmcfit_core::diagnostics::offset_and_drift;
 /// let times: Vec<f64> = (0..50).map(f64::from).collect();
 /// let drifting: Vec<f64> = times.iter().map(|t| 1.0 + 0.1 * t).collect();
 /// let [offset, drift] = offset_and_drift(&times, &drifting);

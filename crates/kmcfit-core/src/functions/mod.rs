@@ -4,7 +4,7 @@
 //! times gradients with respect to nodal values, and the L2 inner product of two functions is `theta^T (B^T W B) theta'` with
 //! trapezoid weights `W`.
 
-pub mod basis;
+pub(crate) mod basis;
 mod coefficient_set;
 mod design;
 mod gram;
@@ -15,12 +15,12 @@ mod ratio;
 mod scalar;
 mod total_variation;
 
-pub use crate::structure::CoefficientKind;
-pub use basis::Basis;
+pub(crate) use crate::structure::CoefficientKind;
+pub use basis::{Basis, from_physical_powers, physical_powers, uniform_knots};
 pub use coefficient_set::CoefficientSet;
-pub use design::Design;
-pub use gram::Gram;
-pub use local_rows::LocalRows;
+pub(crate) use design::Design;
+pub(crate) use gram::Gram;
+pub(crate) use local_rows::LocalRows;
 pub use parameterization::Parameterization;
 pub use penalty::{Penalty, WeightRule};
 pub use ratio::Ratio;

@@ -35,14 +35,14 @@ mod step_shift;
 mod structural_rank;
 mod target;
 mod width_shift;
-pub use classification::is_negligible;
+pub(crate) use classification::is_negligible;
 
 use crate::problem::Problem;
 
 /// True if the covariance of the estimates is that of their errors: no constraint is active, and the cost has no terms besides the
 /// misfit and penalties whose rule gives coverage
 /// ([`WeightRule::gives_coverage`](crate::functions::WeightRule::gives_coverage)).
-pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
+pub(crate) fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     let mut unpenalised = problem.clone();
     let penalties = &mut unpenalised.parts_mut().penalties;
     penalties.retain(|penalty| !penalty.rule.is_some_and(|rule| rule.gives_coverage()));
@@ -54,6 +54,7 @@ pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
     !active::active_rows(problem, theta).is_empty()
 }
 
+pub use crate::spans::span_words;
 pub use band::Band;
 pub use bands::Bands;
 pub use classification::{
@@ -66,7 +67,7 @@ pub(crate) use columns::stacked;
 pub(crate) use covariance::is_bayesian;
 pub use covariance_kind::CovarianceKind;
 pub use curve::Curve;
-pub use equation_rows::EquationRows;
+pub(crate) use equation_rows::EquationRows;
 pub use experiments::{Ranked, rank_experiments};
 pub(crate) use factorisation::Factorisation;
 pub use quantities::Quantities;

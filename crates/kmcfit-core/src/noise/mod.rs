@@ -22,12 +22,16 @@ mod order;
 mod penalty_moments;
 mod restricted_likelihood;
 
-pub use autoregression::Autoregression;
-pub use burg::burg;
-pub use correlation::{Correlation, CorrelationLaw, uninterrupted_runs};
-pub use exponential::select_exponential;
-pub use input_errors::{InputErrors, InputRow, InputStep};
-pub use kernel_covariance::{KernelCovariance, automatic_bandwidth};
-pub use order::{HIGHEST_ORDER, select_order};
-pub use penalty_moments::PenaltyMoments;
-pub use restricted_likelihood::{ChannelMoments, NoiseCoordinates, RestrictedLikelihood, STEP};
+pub(crate) use autoregression::Autoregression;
+pub(crate) use burg::burg;
+pub(crate) use correlation::uninterrupted_runs;
+pub use correlation::{Correlation, CorrelationLaw};
+pub(crate) use exponential::select_exponential;
+pub(crate) use input_errors::{InputErrors, InputRow, InputStep};
+pub(crate) use kernel_covariance::KernelCovariance;
+pub use kernel_covariance::automatic_bandwidth;
+pub(crate) use order::{HIGHEST_ORDER, select_order};
+pub(crate) use penalty_moments::PenaltyMoments;
+pub(crate) use restricted_likelihood::{
+    ChannelMoments, NoiseCoordinates, RestrictedLikelihood, STEP,
+};

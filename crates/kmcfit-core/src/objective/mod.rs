@@ -11,12 +11,15 @@ mod scales;
 mod simulated_record;
 mod step_halving;
 
-pub use gradient::{Gradient, GradientKind};
-pub use residual_diagnostics::{all_diagnostics, channel_fit_percent, diagnostics, outliers};
+pub(crate) use gradient::Gradient;
+pub use gradient::GradientKind;
+pub use residual_diagnostics::{all_diagnostics, outliers};
+pub(crate) use residual_diagnostics::{channel_fit_percent, diagnostics};
 pub(crate) use row_prediction::RowSamples;
-pub use scales::state_scales;
-pub use simulated_record::{RecordTangent, SimulatedRecord};
-pub use step_halving::Refined;
+pub(crate) use scales::state_scales;
+pub(crate) use simulated_record::RecordTangent;
+pub use simulated_record::SimulatedRecord;
+pub(crate) use step_halving::Refined;
 
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment};

@@ -23,11 +23,13 @@ mod solve;
 mod stages;
 mod subproblem;
 
-pub use chain::BandedFactor;
+pub(crate) use chain::BandedFactor;
 pub use kkt::Kkt;
-pub use layout::{ResponseVariables, StageLayout};
-pub use primal_dual::PrimalDual;
-pub use projection::{project, project_by};
-pub use solve::{ConicStatus, Solution};
+pub(crate) use layout::{ResponseVariables, StageLayout};
+pub(crate) use primal_dual::PrimalDual;
+pub use projection::project;
+pub(crate) use projection::project_by;
+pub use solve::ConicStatus;
+pub(crate) use solve::Solution;
 
 pub use subproblem::Subproblem;

@@ -26,7 +26,7 @@ pub use misfit::integral_over;
 pub use noise::{NoiseEstimate, NoiseModel, ScoreCovariance};
 pub use sensor::Sensor;
 pub use weighting::Weighting;
-pub use whitening::Majorant;
+pub(crate) use whitening::Majorant;
 
 /// Number of steps from which a record is processed in parts.
 pub(crate) const LONG_RECORD_STEPS: usize = 1 << 15;

@@ -83,18 +83,6 @@ fn moves_beside(values: &[f64], level: f64, least: f64) -> bool {
 
 /// Number of samples exactly at the largest or smallest value, and that value, if they accumulate there as those of a response
 /// beyond the range of the sensor; for both limits, the one with more samples. `None` without clipping.
-///
-/// ```
-/// use kmcfit_core::internals::signal::clipped;
-/// let wave: Vec<f64> = (0..400).map(|i| (0.1 * f64::from(i)).sin()).collect();
-/// assert_eq!(clipped(&wave), None);
-/// let cut: Vec<f64> = wave.iter().map(|y| y.min(0.9)).collect();
-/// let (samples, level) = clipped(&cut).expect("it is cut");
-/// assert_eq!(level, 0.9);
-/// assert_eq!(samples, wave.iter().filter(|y| **y >= 0.9).count());
-/// let coarse: Vec<f64> = wave.iter().map(|y| (10.0 * y).round() / 10.0).collect();
-/// assert_eq!(clipped(&coarse), None);
-/// ```
 pub fn clipped(values: &[f64]) -> Option<(usize, f64)> {
     let piled_up = |sign: f64| {
         let top = values.iter().map(|y| sign * y).reduce(f64::max)?;
@@ -123,6 +111,18 @@ mod tests {
         let at = |i: i32| (std::f64::consts::TAU * f64::from(i) / per_period).sin();
         let rounded = |y: f64| (y / round).round() * round;
         (0..400).map(|i| rounded(at(i))).collect()
+    }
+
+    #[test]
+    fn a_cut_wave_is_clipped_and_a_coarse_one_is_not() {
+        let wave: Vec<f64> = (0..400).map(|i| (0.1 * f64::from(i)).sin()).collect();
+        assert_eq!(clipped(&wave), None);
+        let cut: Vec<f64> = wave.iter().map(|y| y.min(0.9)).collect();
+        let (samples, level) = clipped(&cut).expect("it is cut");
+        assert_eq!(level, 0.9);
+        assert_eq!(samples, wave.iter().filter(|y| **y >= 0.9).count());
+        let coarse: Vec<f64> = wave.iter().map(|y| (10.0 * y).round() / 10.0).collect();
+        assert_eq!(clipped(&coarse), None);
     }
 
     #[test]

@@ -20,7 +20,7 @@ impl Extremes {
     /// Extremes of the values within the limits `within`; NaN is not.
     ///
     /// ```
-    /// use kmcfit_core::internals::signal::Extremes;
+    /// use kmcfit_core::signal::Extremes;
     /// let found = Extremes::of(&[2.0, -3.0, f64::NAN, 7.0], -5.0..=5.0);
     /// assert_eq!((found.low, found.high, found.are_all_within), (-3.0, 2.0, false));
     /// ```

@@ -1,7 +1,7 @@
 //! Signals over time: interpolation, excitation shapes, filters, decimation, spectra, and checks of samples.
 //!
 //! ```
-//! use kmcfit_core::{Interpolation, Signal};
+//! use kmcfit_core::signal::{Interpolation, Signal};
 //! let times: Vec<f64> = (0..11).map(|i| 0.1 * f64::from(i)).collect();
 //! let values = times.iter().map(|t| t * t * t).collect();
 //! let signal = Signal::new(times, values, Interpolation::Cubic).expect("increasing times");
@@ -25,11 +25,13 @@ mod spacing;
 mod spectrum;
 mod spline;
 
-pub use clipping::{clipped, cut_off};
+pub(crate) use clipping::clipped;
+pub use clipping::cut_off;
 pub use decimate::decimate;
 pub use extremes::Extremes;
 pub use faults::{dropouts, quantisation, spikes};
-pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
+pub use filter::{SecondOrder, band_pass, high_pass, low_pass};
+pub(crate) use filter::{zero_phase, zero_phase_transpose};
 pub(crate) use fourier::RealTransform;
 pub use frequency_response::{Mobility, driven_oscillator, two_forced_modes};
 pub use interpolate::{Interpolation, Signal};

@@ -15,7 +15,7 @@ const SUDDEN: f64 = 10.0;
 /// rest, or with isolated outliers.
 ///
 /// ```
-/// use kmcfit_core::internals::signal::onset;
+/// use kmcfit_core::signal::onset;
 /// let swing = |i: i32| (-0.01 * f64::from(i)).exp() * (0.2 * f64::from(i)).cos();
 /// let held: Vec<f64> = (-60..400).map(|i| swing(i.max(0))).collect();
 /// let first = onset(&held, 0.05).expect("it is held for 60 samples");

@@ -18,7 +18,7 @@ pub enum SweepLaw {
 /// An excitation shape. Amplitudes are in the unit of the signal, times in s, frequencies in Hz, phases in rad.
 ///
 /// ```
-/// use kmcfit_core::internals::signal::ExcitationShape;
+/// use kmcfit_core::signal::ExcitationShape;
 /// let step = ExcitationShape::Step { amplitude: 2.0, at: 1.0 };
 /// assert_eq!((step.value_before(1.0), step.value(1.0)), (0.0, 2.0));
 /// ```

@@ -23,7 +23,7 @@ const FEWEST: usize = 4;
 /// is the variance of a stationary series. The transform does not depend on the instruction set of the processor.
 ///
 /// ```
-/// use kmcfit_core::internals::signal::Spectrum;
+/// use kmcfit_core::signal::Spectrum;
 /// let series: Vec<f64> = (0..500).map(|i| (0.3 * f64::from(i)).sin()).collect();
 /// let spectrum = Spectrum::of(&series, 0.01).expect("it varies");
 /// let frequency = 0.3 / (0.01 * std::f64::consts::TAU);
@@ -149,7 +149,7 @@ impl Spectrum {
     /// for noise alone, or a response that fills half of the frequencies.
     ///
     /// ```
-    /// use kmcfit_core::internals::signal::Spectrum;
+    /// use kmcfit_core::signal::Spectrum;
     /// let noise = |i: i64| 1e-2 * ((i * i * 7919) % 1009 - 504) as f64 / 291.0;
     /// let decay = |i: i64| (-0.01 * i as f64).exp() * (0.3 * i as f64).cos();
     /// let series: Vec<f64> = (0..2000).map(|i| decay(i) + noise(i)).collect();

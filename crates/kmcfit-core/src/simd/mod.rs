@@ -16,7 +16,7 @@ mod x86;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use real::Real;
+pub(crate) use real::Real;
 
 use portable::Portable;
 use std::ffi::OsString;

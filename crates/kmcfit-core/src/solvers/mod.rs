@@ -40,35 +40,34 @@ mod weight_choice;
 mod weight_path;
 mod weight_rules;
 
-pub use crate::record::Measurements;
+pub(crate) use crate::record::Measurements;
 pub use active_set::{ActiveGroup, active_constraints};
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use grid_refinement::{GridNotice, OnNodes, fit_on_refined_grids};
 pub use history::IterationRecord;
 pub(crate) use input_errors::input_error_effect;
-pub use iterate::Iterate;
+pub(crate) use iterate::Iterate;
 pub(crate) use linearization::{
     add_penalties, add_priors, add_soft, linear_predictions, reduced_jacobian, weighted_jacobian,
 };
+pub(crate) use methods::equation_error::NoEquationRows;
 pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{
-    EquationBalance, EquationForm, EquationShare, MissingTerm, NoEquationRows, equation_balance,
-    equation_error, equation_rows, missing_terms,
+    EquationBalance, EquationForm, EquationShare, MissingTerm, equation_balance, equation_error,
+    equation_rows, missing_terms,
 };
 pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use observer::{IterationEvent, Observer};
 pub use optimality::Optimality;
 pub use path::{PathPoint, WeightPath};
-pub use reason::Reason;
 pub use settings::{FitSettings, Initial, QpSolver, Solver, StartStrategy};
-pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;
 pub use start_strategy::fit;
-pub use state_estimation::estimate_states;
-pub use termination::{Outcome, Status, Stopping};
-pub use timings::{Timings, timed};
+pub(crate) use state_estimation::estimate_states;
+pub use termination::{Status, Stopping};
+pub use timings::timed;
 pub use validation::predict_validation;
 pub use weight_choice::{choose_weight, choose_weight_watched};
 

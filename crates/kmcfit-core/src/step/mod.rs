@@ -43,15 +43,16 @@ mod tests;
 mod trajectory;
 mod trials;
 
-pub use assembled::{Motion, MotionError, RowObservation, RowObserver};
+pub(crate) use assembled::{RowObservation, RowObserver};
 pub use engine::{Driven, EngineMode};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
 pub use error::{Cause, SimulationError};
-pub use gradient::CoefficientGradient;
-pub use observation::{Observation, observe, observe_value};
+pub(crate) use gradient::CoefficientGradient;
+pub use observation::observe;
+pub(crate) use observation::{Observation, observe_value};
 pub use paper::continuous_adjoint;
 pub(crate) use stage::eight;
-pub use step_jacobian::StepJacobians;
+pub(crate) use step_jacobian::StepJacobians;
 pub use trajectory::Trajectory;
 pub(crate) use trials::SearchRay;
 

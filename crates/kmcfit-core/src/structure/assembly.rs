@@ -33,12 +33,12 @@ pub struct Structure {
 pub enum StructureError {
     /// There is no coordinate.
     #[error("a structure has at least one coordinate")]
-    NoCoordinate,
+    Empty,
     /// An end is neither a coordinate nor a support.
     #[error(
         "end {index} of function {function}: there are {coordinates} coordinates and {supports} supports"
     )]
-    NoSuchEnd {
+    UnknownEnd {
         /// Index of the function, inertias first.
         function: usize,
         /// Index of the end.
@@ -50,10 +50,10 @@ pub enum StructureError {
     },
     /// An inertia or element acts on no coordinate.
     #[error("function {0} acts on no coordinate")]
-    NoEnd(usize),
+    Unattached(usize),
     /// No inertia acts on a coordinate.
     #[error("no inertia acts on coordinate {0}")]
-    NoInertia(usize),
+    Massless(usize),
 }
 
 impl Structure {
@@ -68,7 +68,7 @@ impl Structure {
         elements: Vec<(Law, Ends)>,
     ) -> Result<Self, StructureError> {
         if coordinates == 0 {
-            return Err(StructureError::NoCoordinate);
+            return Err(StructureError::Empty);
         }
         let (laws, ends): (Vec<Law>, Vec<Ends>) = elements.into_iter().unzip();
         let mut has_inertia = vec![false; coordinates];
@@ -80,7 +80,7 @@ impl Structure {
                 .iter()
                 .find(|(j, _)| *j >= coordinates + supports);
             if let Some((index, _)) = beyond {
-                return Err(StructureError::NoSuchEnd {
+                return Err(StructureError::UnknownEnd {
                     function,
                     index: *index,
                     coordinates,
@@ -91,7 +91,7 @@ impl Structure {
                 free(ends, coordinates).map(|(j, _)| j).min(),
                 free(ends, coordinates).map(|(j, _)| j).max(),
             ) else {
-                return Err(StructureError::NoEnd(function));
+                return Err(StructureError::Unattached(function));
             };
             bandwidth = bandwidth.max(last - first);
             if function < inertias.len() {
@@ -99,7 +99,7 @@ impl Structure {
             }
         }
         if let Some(j) = has_inertia.iter().position(|has| !has) {
-            return Err(StructureError::NoInertia(j));
+            return Err(StructureError::Massless(j));
         }
         let pattern = |ends: &Ends| -> Vec<(usize, f64)> {
             let pairs = free(ends, coordinates).flat_map(|(i, a)| {

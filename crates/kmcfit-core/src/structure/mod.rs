@@ -9,15 +9,16 @@
 //! | `banded` | symmetric banded matrices, for structures of any size |
 //! | `link` | elements of the small structures whose size is compiled |
 
-mod assembly;
+pub(crate) mod assembly;
 pub(crate) mod banded;
 mod elements;
 mod ends;
 mod hysteresis;
 mod link;
 
-pub use assembly::{Structure, StructureError};
-pub use elements::{CoefficientKind, Law, MOST_ELEMENTS};
+pub use assembly::Structure;
+pub(crate) use elements::MOST_ELEMENTS;
+pub use elements::{CoefficientKind, Law};
 pub use ends::Ends;
 pub(crate) use hysteresis::Partials;
 pub(crate) use link::Link;

@@ -36,6 +36,64 @@ impl PredictionCase {
             excitation: None,
         }
     }
+
+    /// Predicts it at the parameters `theta`, with the confidence band of `covariance` and the envelope of `extremes`.
+    ///
+    /// # Errors
+    /// A [`SimulationError`] if the simulation at the optimum fails.
+    ///
+    /// # Panics
+    /// If the covariance is not one of the parameters.
+    pub fn predict(
+        &self,
+        problem: &Problem,
+        theta: &[f64],
+        covariance: Option<&DMatrix<f64>>,
+        extremes: &[Extreme],
+    ) -> Result<Prediction, SimulationError> {
+        let seen = with_run(problem, self);
+        let evaluation = seen.evaluate(theta)?;
+        let response = evaluation.trajectories[0].clone();
+        let y = response.displacement(0);
+        let band = covariance.map(|covariance| {
+            assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
+            let errors = standard_errors(&seen, &evaluation, covariance);
+            band(y, errors.into_iter().flatten())
+        });
+        let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
+        let mut furthest: Option<(String, f64)> = None;
+        let mut unbounded = Vec::new();
+        let most = BOUNDED * y.iter().fold(0.0f64, |most, y| most.max(y.abs()));
+        for extreme in extremes {
+            let other = seen.evaluate(&extreme.parameters).ok();
+            let is_bounded = |e: &Evaluation| {
+                let mut all = e.trajectories[0].displacement(0).iter();
+                all.all(|y| y.abs() <= most)
+            };
+            let Some(other) = other.filter(is_bounded) else {
+                unbounded.push(extreme.name());
+                continue;
+            };
+            let mut distance = 0.0f64;
+            let others = other.trajectories[0].displacement(0);
+            for ((ends, other), y) in envelope.iter_mut().zip(others).zip(y) {
+                *ends = [ends[0].min(*other), ends[1].max(*other)];
+                distance = distance.max((other - y).abs());
+            }
+            if furthest.as_ref().is_none_or(|(_, most)| distance > *most) {
+                furthest = Some((extreme.name(), distance));
+            }
+        }
+        Ok(Prediction {
+            name: self.name.clone(),
+            times: seen.system.grid.times(),
+            band,
+            worst: furthest.is_some().then_some(envelope),
+            furthest,
+            unbounded,
+            response,
+        })
+    }
 }
 
 /// Predicted response of one case.
@@ -56,64 +114,6 @@ pub struct Prediction {
     pub furthest: Option<(String, f64)>,
     /// Extreme systems without a bounded response: the simulation fails, or the displacement exceeds [`BOUNDED`] times that of the optimum.
     pub unbounded: Vec<String>,
-}
-
-/// Predicts `run` at the parameters `theta`, with the confidence band of `covariance` and the envelope of `extremes`.
-///
-/// # Errors
-/// A [`SimulationError`] if the simulation at the optimum fails.
-///
-/// # Panics
-/// If the covariance is not one of the parameters.
-pub fn predict(
-    problem: &Problem,
-    theta: &[f64],
-    run: &PredictionCase,
-    covariance: Option<&DMatrix<f64>>,
-    extremes: &[Extreme],
-) -> Result<Prediction, SimulationError> {
-    let seen = with_run(problem, run);
-    let evaluation = seen.evaluate(theta)?;
-    let response = evaluation.trajectories[0].clone();
-    let y = response.displacement(0);
-    let band = covariance.map(|covariance| {
-        assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
-        let errors = standard_errors(&seen, &evaluation, covariance);
-        band(y, errors.into_iter().flatten())
-    });
-    let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
-    let mut furthest: Option<(String, f64)> = None;
-    let mut unbounded = Vec::new();
-    let most = BOUNDED * y.iter().fold(0.0f64, |most, y| most.max(y.abs()));
-    for extreme in extremes {
-        let other = seen.evaluate(&extreme.parameters).ok();
-        let is_bounded = |e: &Evaluation| {
-            let mut all = e.trajectories[0].displacement(0).iter();
-            all.all(|y| y.abs() <= most)
-        };
-        let Some(other) = other.filter(is_bounded) else {
-            unbounded.push(extreme.name());
-            continue;
-        };
-        let mut distance = 0.0f64;
-        let others = other.trajectories[0].displacement(0);
-        for ((ends, other), y) in envelope.iter_mut().zip(others).zip(y) {
-            *ends = [ends[0].min(*other), ends[1].max(*other)];
-            distance = distance.max((other - y).abs());
-        }
-        if furthest.as_ref().is_none_or(|(_, most)| distance > *most) {
-            furthest = Some((extreme.name(), distance));
-        }
-    }
-    Ok(Prediction {
-        name: run.name.clone(),
-        times: seen.system.grid.times(),
-        band,
-        worst: furthest.is_some().then_some(envelope),
-        furthest,
-        unbounded,
-        response,
-    })
 }
 
 /// Standard errors `sqrt(diag(J C J^T))` of the predictions of each channel, with their derivatives `J` in the parameters.

@@ -8,13 +8,14 @@ mod coefficients;
 mod grid;
 mod input;
 mod method;
-pub mod quadrature;
+pub(crate) mod quadrature;
 mod stability;
 
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use grid::{Grid, TimePoint, round_time};
 pub use input::{Excitation, InputQuantity, InputSample, StageSamples, SupportMotion};
 pub use method::Method;
+pub use quadrature::{trapezoid, trapezoid_weights};
 
 use crate::structure::{Law, MOST_ELEMENTS, Structure};
 

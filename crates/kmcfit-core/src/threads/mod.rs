@@ -7,7 +7,8 @@
 
 mod parallel;
 
-pub use parallel::{interruptible, is_stopped, map, map_with_progress};
+pub use parallel::{interruptible, map};
+pub(crate) use parallel::{is_stopped, map_with_progress};
 
 use std::cell::Cell;
 use std::io;
@@ -30,7 +31,7 @@ static PROCESSORS: LazyLock<usize> =
 static BUSY: AtomicUsize = AtomicUsize::new(0);
 
 /// True if a processor is free and this thread may use it.
-pub fn spare() -> bool {
+pub(crate) fn spare() -> bool {
     available() > 1
 }
 
@@ -67,7 +68,7 @@ pub fn analyses_at_once(samples: usize) -> usize {
 ///
 /// # Errors
 /// If the operating system refuses.
-pub fn spawn_scoped<'scope, T: Send + 'scope>(
+pub(crate) fn spawn_scoped<'scope, T: Send + 'scope>(
     scope: &'scope Scope<'scope, '_>,
     work: impl FnOnce() -> T + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
@@ -80,7 +81,7 @@ pub fn sharing<T>(work: impl FnOnce() -> T) -> T {
 }
 
 /// Does `work` with this number of threads for each parallel work of this thread, whatever processors are free.
-pub fn given<T>(threads: usize, work: impl FnOnce() -> T) -> T {
+pub(crate) fn given<T>(threads: usize, work: impl FnOnce() -> T) -> T {
     /// Restores the number, after a panic too, which a fleet or Python may catch.
     struct Restored(Option<usize>);
 

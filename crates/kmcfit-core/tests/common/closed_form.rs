@@ -1,6 +1,6 @@
 //! Responses in closed form.
 
-use kmcfit_core::internals::system::State;
+use kmcfit_core::system::State;
 
 /// m = 1 - a t, c = 0, k = 1: `y = sqrt(x) [A J1(z) + B Y1(z)]`, `x = 1 - a t`, `z = 2 sqrt(x)/a`.
 pub struct Bessel {

@@ -9,12 +9,12 @@ pub mod reference;
 pub mod sensed;
 pub mod synthetic;
 
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
-use kmcfit_core::internals::host::{self, Host};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::functions::{CoefficientFunction, Parameterization};
+use kmcfit_core::host::{self, Host};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Experiment, Weighting};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Grid, Method, NodalCoefficients, State, System};
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -145,8 +145,8 @@ pub fn problem_of(
 /// and k, and `k(0) = 1`; with bounds `m >= 0.05, c >= 0, k >= 0` at every parameter of a nodal or
 /// piecewise linear basis if asked for.
 pub fn add_physics(problem: &mut Problem, weight: f64, positive: bool) {
-    use kmcfit_core::internals::constraints::RowGroup;
-    use kmcfit_core::internals::functions::Penalty;
+    use kmcfit_core::constraints::RowGroup;
+    use kmcfit_core::functions::Penalty;
     let grid = problem.system.grid;
     let orders = [2, 1, 1];
     let ranges = problem.functions.ranges().to_vec();

@@ -1,6 +1,6 @@
 //! An independent simulation by textbook formulas, generic over the type of number.
 
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::system::Method;
 use num_dual::DualNum;
 
 /// Functions and force at the nodes.

@@ -1,8 +1,8 @@
 //! An independent evaluation of records with all terms, inputs, sensors and losses by textbook formulas, generic over the type of
 //! number.
 
-use kmcfit_core::internals::record::{ChannelKind, Loss};
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::record::{ChannelKind, Loss};
+use kmcfit_core::system::Method;
 use num_dual::DualNum;
 
 /// A number type with derivatives.

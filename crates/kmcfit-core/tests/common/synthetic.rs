@@ -1,12 +1,12 @@
 //! Records of known systems by the independent evaluation of [`super::sensed`], and their fits.
 
 use super::sensed::{Record, Response};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
-use kmcfit_core::internals::structure::Law;
-use kmcfit_core::internals::system::{
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::ChannelKind;
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::structure::Law;
+use kmcfit_core::system::{
     Excitation, InputSample, NodalCoefficients, StageSamples, State, System,
 };
 use nalgebra::DMatrix;
@@ -98,7 +98,7 @@ pub fn settings() -> FitSettings {
             tolerance: Some(1e-12),
             ..Stopping::exactly(100)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }

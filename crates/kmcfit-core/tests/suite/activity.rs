@@ -2,14 +2,13 @@
 
 use crate::common;
 
-use kmcfit_core::internals::constraints::{Constraint, RowGroup};
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{
-    FitSettings, Initial, Solver, Stopping, active_constraints, fit,
-};
-use kmcfit_core::internals::system::{Method, NodalCoefficients};
+use kmcfit_core::constraints::{Constraint, RowGroup};
+use kmcfit_core::functions::{CoefficientFunction, Parameterization};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{FitSettings, Initial, Solver, Stopping, active_constraints, fit};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 
@@ -42,7 +41,7 @@ fn settings() -> FitSettings {
             tolerance: Some(1e-12),
             ..Stopping::exactly(30)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }

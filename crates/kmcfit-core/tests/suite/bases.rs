@@ -1,12 +1,8 @@
 //! Every basis against independent evaluations of its functions.
 
-use kmcfit_core::internals::constraints::Rows;
-use kmcfit_core::internals::functions::Basis;
-use kmcfit_core::internals::functions::basis::{
-    from_physical_powers, physical_powers, uniform_knots,
-};
-use kmcfit_core::internals::system::Grid;
-use kmcfit_core::internals::system::quadrature::trapezoid_weights;
+use kmcfit_core::constraints::Rows;
+use kmcfit_core::functions::{Basis, from_physical_powers, physical_powers, uniform_knots};
+use kmcfit_core::system::{Grid, trapezoid_weights};
 use proptest::prelude::*;
 
 /// A record that does not begin at zero, with knots that are not multiples of the step.

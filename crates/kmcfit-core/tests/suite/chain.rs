@@ -3,10 +3,10 @@
 
 use crate::common::properties::properties;
 use crate::common::{add_physics, errors, paper_problem, paper_system};
-use kmcfit_core::internals::constraints::Rows;
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::qp::Subproblem;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::constraints::Rows;
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::qp::Subproblem;
+use kmcfit_core::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 use proptest::prelude::*;
 
 /// Rows that couple neighbours, a few equalities, and a variable in all rows.
@@ -174,7 +174,7 @@ fn tens_of_thousands_of_values_take_no_more_work_than_thousands() {
             initial: Initial::Data,
             gradient: GradientKind::Discrete,
             stopping: Stopping::default(),
-            qp: kmcfit_core::QpSolver::Auto,
+            qp: kmcfit_core::solvers::QpSolver::Auto,
             interrupt: None,
         };
         let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();

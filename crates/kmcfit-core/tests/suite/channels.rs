@@ -3,17 +3,14 @@
 
 use crate::common::properties::properties;
 use crate::common::sensed::{Record, Response, cost};
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter,
-    ScalarValue,
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, Prior, ScalarParameter, ScalarValue,
 };
-use kmcfit_core::internals::objective::{Evaluation, GradientKind};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{
-    Excitation, Grid, InputSample, Method, StageSamples, State, System,
-};
+use kmcfit_core::objective::{Evaluation, GradientKind};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, InputSample, Method, StageSamples, State, System};
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};

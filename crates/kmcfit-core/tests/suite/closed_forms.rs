@@ -3,8 +3,8 @@
 use crate::common;
 
 use crate::common::closed_form::{Bessel, constant_coefficients};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{Grid, Method, NodalCoefficients, State, System};
 
 fn system(nodes: usize, duration: f64, method: Method) -> System {
     System {

@@ -1,16 +1,13 @@
 //! Constraints: every kind on every basis against a dense evaluation of the functions.
 
-use kmcfit_core::internals::constraints::{Constraint, Constraints, RowGroup, Shape, TimeHistory};
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization,
-};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::qp::{ConicStatus, project};
-use kmcfit_core::internals::record::Experiment;
-use kmcfit_core::internals::solvers::StartProjection;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Grid, Method, State, System};
+use kmcfit_core::constraints::{Constraint, Constraints, RowGroup, Shape, TimeHistory};
+use kmcfit_core::functions::{Basis, CoefficientFunction, Parameterization, uniform_knots};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::qp::{ConicStatus, project};
+use kmcfit_core::record::Experiment;
+use kmcfit_core::solvers::StartProjection;
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Grid, Method, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

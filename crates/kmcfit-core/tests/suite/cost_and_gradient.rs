@@ -1,12 +1,12 @@
 //! The combined computation of cost and gradient equals an evaluation followed by its adjoint, for each algorithm.
 
 use crate::common::paper_problem;
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Weighting};
-use kmcfit_core::internals::step::Cause;
+use kmcfit_core::builder::{Builder, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Weighting};
+use kmcfit_core::step::Cause;
 
 /// Rounding of the same sums in another order, relative to the largest entry.
 const ROUNDING: f64 = 1e-11;

@@ -2,13 +2,13 @@
 //! named as the cause of a poor fit without the parameter. Oscillators of 1 Hz under a broadband force, by an independent integrator.
 
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::assessment::{Doubt, FitAssessment, RecordError};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::{CoefficientSpec, DelayValue, ScalarSpec, SensorSpec};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 400;

@@ -4,13 +4,12 @@ use crate::common;
 
 use crate::common::properties::properties;
 use crate::common::reference::{Inputs, response};
-use kmcfit_core::internals::objective::{Evaluation, GradientKind};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::step::{Driven, Trajectory, continuous_adjoint};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::quadrature::trapezoid_weights;
-use kmcfit_core::internals::system::{
-    Excitation, Grid, Method, NodalCoefficients, State, System, SystemTangent,
+use kmcfit_core::objective::{Evaluation, GradientKind};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::step::{Driven, Trajectory, continuous_adjoint};
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, SystemTangent, trapezoid_weights,
 };
 use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;

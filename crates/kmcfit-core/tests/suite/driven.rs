@@ -2,10 +2,10 @@
 //! nodes.
 
 use crate::common::closed_form::constant_coefficients;
-use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::step::observe;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{
+use kmcfit_core::record::ChannelKind;
+use kmcfit_core::step::observe;
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
     TimePoint,
 };

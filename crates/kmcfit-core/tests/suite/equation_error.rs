@@ -4,13 +4,13 @@
 use crate::common;
 
 use crate::common::synthetic::Truth;
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::solvers::{Measurements, equation_error};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{CoefficientFunction, Parameterization};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Measurements, Weighting};
+use kmcfit_core::solvers::equation_error;
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use std::f64::consts::TAU;
 
 const NODES: usize = 401;

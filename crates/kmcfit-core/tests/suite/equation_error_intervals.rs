@@ -6,15 +6,15 @@
 
 use crate::common::counts::{least_held, seeds};
 use crate::common::synthetic::with_noise;
-use kmcfit_core::internals::assessment::{EquationErrorIntervals, NoIntervals};
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::identifiability::{Classification, Condition, CovarianceKind};
-use kmcfit_core::internals::noise::automatic_bandwidth;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Solver, Status, equation_rows, fit};
-use kmcfit_core::internals::system::Grid;
+use kmcfit_core::assessment::{EquationErrorIntervals, NoIntervals};
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::functions::Ratio;
+use kmcfit_core::identifiability::{Classification, Condition, CovarianceKind};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::noise::automatic_bandwidth;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, Solver, Status, equation_rows, fit};
+use kmcfit_core::system::Grid;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

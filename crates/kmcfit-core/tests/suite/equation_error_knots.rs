@@ -2,12 +2,12 @@
 //! second, forced and free; data by an independent integrator. Seeds are 0, 1, 2, ...
 
 use crate::common::forced::{response, rms, white};
-use kmcfit_core::internals::assessment::EquationErrorIntervals;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::identifiability::Band;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{FitSettings, Solver, fit};
+use kmcfit_core::assessment::EquationErrorIntervals;
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::identifiability::Band;
 use kmcfit_core::model::{AutoWord, CoefficientSpec, KnotSpec};
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{FitSettings, Solver, fit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -3,13 +3,13 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{response, rms, white};
-use kmcfit_core::internals::assessment::EquationErrorIntervals;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
-use kmcfit_core::internals::signal::SecondOrder;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Solver, Status, fit};
+use kmcfit_core::assessment::EquationErrorIntervals;
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Loss, Weighting};
+use kmcfit_core::signal::SecondOrder;
+use kmcfit_core::solvers::{Fit, FitSettings, Solver, Status, fit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

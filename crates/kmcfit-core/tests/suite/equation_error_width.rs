@@ -3,15 +3,15 @@
 //! are 0, 1, 2, ...
 
 use crate::common::forced::white;
-use kmcfit_core::internals::assessment::EquationErrorIntervals;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{
+use kmcfit_core::assessment::EquationErrorIntervals;
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{
     Fit, FitSettings, MissingTerm, Solver, equation_balance, fit, missing_terms,
 };
-use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::structure::CoefficientKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

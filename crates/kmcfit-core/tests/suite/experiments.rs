@@ -3,15 +3,13 @@
 use crate::common;
 
 use crate::common::synthetic::{Truth, run, settings};
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Ratio,
-};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::solvers::{Fit, fit};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{Basis, CoefficientFunction, Parameterization, Penalty, Ratio};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::solvers::{Fit, fit};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 const NODES: usize = 401;
 const DURATION: f64 = 25.0;

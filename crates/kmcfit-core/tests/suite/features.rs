@@ -2,17 +2,16 @@
 //! parameters are recovered to 1e-8.
 
 use crate::common::synthetic::{Truth, rms, run, settings};
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
-    ScalarValue,
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, Penalty, Prior, ScalarParameter, ScalarValue,
+    uniform_knots,
 };
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
-use kmcfit_core::internals::signal::{SecondOrder, band_pass};
-use kmcfit_core::internals::solvers::fit;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+use kmcfit_core::signal::{SecondOrder, band_pass};
+use kmcfit_core::solvers::fit;
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{
     Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
 };
 use rand::{RngExt, SeedableRng};
@@ -432,7 +431,7 @@ fn samples_with_individual_sigmas_and_robust_losses() {
         Case::linear(vec![Record::free(vec![sample.clone()])]).check(&format!("{loss:?}"));
     }
     sample.loss = Loss::Squares;
-    sample.sigma = kmcfit_core::internals::record::integral_over(&times);
+    sample.sigma = kmcfit_core::record::integral_over(&times);
     Case::linear(vec![Record::free(vec![sample])]).check("integral over irregular times");
 }
 

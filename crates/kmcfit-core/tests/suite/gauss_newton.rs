@@ -3,14 +3,13 @@
 use crate::common;
 
 use crate::common::synthetic::{settings, with_noise};
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{
-    CoefficientFunction, CoefficientKind, Prior, ScalarParameter, ScalarValue,
-};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Sensor, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Stopping, fit_from};
-use kmcfit_core::internals::system::{Method, NodalCoefficients};
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{CoefficientFunction, Prior, ScalarParameter, ScalarValue};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Sensor, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, Stopping, fit_from};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients};
 use nalgebra::{Matrix2, Vector2};
 
 const NODES: usize = 101;

@@ -4,19 +4,18 @@ use crate::common;
 
 use crate::common::properties::properties;
 use crate::common::synthetic::{run, with_noise};
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, Penalty, uniform_knots,
 };
-use kmcfit_core::internals::identifiability::{
+use kmcfit_core::identifiability::{
     Band, Bands, Classification, ScaleFreedom, ScalingAmbiguity, Sensitivity, Side,
     SingularSpectrum, classify_functions, structural_rank,
 };
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Experiment, Weighting};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
 
 const QUANTITIES: [CoefficientKind; 3] = [

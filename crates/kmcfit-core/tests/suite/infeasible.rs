@@ -2,16 +2,16 @@
 
 use crate::common;
 
-use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::qp::project;
-use kmcfit_core::internals::solvers::{
+use kmcfit_core::constraints::{Constraints, RowGroup, TOLERANCE};
+use kmcfit_core::functions::{Basis, CoefficientFunction, uniform_knots};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::qp::project;
+use kmcfit_core::solvers::{
     Fit, FitSettings, Initial, Solver, StartProjection, Status, Stopping, fit,
 };
-use kmcfit_core::internals::system::{Method, NodalCoefficients};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 const UNBOUNDED: f64 = f64::INFINITY;
@@ -62,7 +62,7 @@ fn run(problem: &Problem, solver: Solver, program_iterations: u32) -> Fit {
             program_iterations,
             ..Stopping::exactly(100)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     let start = problem.functions.start();

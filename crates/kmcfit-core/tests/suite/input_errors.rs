@@ -5,13 +5,13 @@
 
 use crate::common::counts::{least_held, seeds, widened};
 use crate::common::forced::{self, broadband, rms};
-use kmcfit_core::internals::assessment::{Doubt, Plausibility};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, InputNoiseKind, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Status, fit_with_noise};
-use kmcfit_core::internals::system::{InputQuantity, Method};
+use kmcfit_core::assessment::{Doubt, Plausibility};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, InputNoiseKind, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, Status, fit_with_noise};
+use kmcfit_core::system::{InputQuantity, Method};
 use std::f64::consts::TAU;
 
 const SPACING: f64 = 0.05;

@@ -2,11 +2,11 @@
 //! are. Oscillators of 1 Hz under a broadband force, 400 displacements with 2 % noise, by an independent integrator.
 
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{Doubt, FitAssessment, RecordError};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
+use kmcfit_core::assessment::{Doubt, FitAssessment, RecordError};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{FitSettings, fit_with_noise};
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 400;

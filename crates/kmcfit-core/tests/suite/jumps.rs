@@ -2,15 +2,13 @@
 
 use crate::common;
 
-use kmcfit_core::internals::constraints::Rows;
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Penalty, TotalVariation,
-};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping, fit};
-use kmcfit_core::internals::system::{Method, NodalCoefficients};
+use kmcfit_core::constraints::Rows;
+use kmcfit_core::functions::{Basis, CoefficientFunction, Penalty, TotalVariation, uniform_knots};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{FitSettings, Initial, Solver, Stopping, fit};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients};
 
 const SIGMA: f64 = 0.02;
 const JUMP: f64 = 12.0;
@@ -66,7 +64,7 @@ fn stiffness(problem: &Problem) -> Vec<f64> {
             tolerance: Some(1e-8),
             ..Stopping::exactly(60)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     let found = fit(problem, &problem.functions.start(), &settings, &mut |_| {}).unwrap();

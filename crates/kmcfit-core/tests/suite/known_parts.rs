@@ -3,14 +3,14 @@
 use crate::common::closed_form::constant_coefficients;
 use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::constraints::TimeHistory;
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
-use kmcfit_core::internals::system::State;
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::constraints::TimeHistory;
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::State;
 use nalgebra::DMatrix;
 
 const SPACING: f64 = 0.02;

@@ -1,15 +1,15 @@
 //! Covariance of fits with more than 64 parameters, by the banded factor, beside dense decompositions.
 
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::WeightRule;
-use kmcfit_core::internals::assessment::quantities_of_many;
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::constraints::Constraint;
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::{Bands, CovarianceKind, Quantities};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::assessment::quantities_of_many;
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::constraints::Constraint;
+use kmcfit_core::functions::WeightRule;
+use kmcfit_core::identifiability::{Bands, CovarianceKind, Quantities};
 use kmcfit_core::model::{CoefficientSpec, PenaltySpec, WeightChoice};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::structure::CoefficientKind;
 
 const SIGMA: f64 = 2e-3;
 

@@ -1,12 +1,12 @@
 //! Physical laws and invariances, tested on random systems from a fixed seed.
 
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Experiment;
-use kmcfit_core::internals::solvers::Fit;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::builder::{Builder, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::Experiment;
+use kmcfit_core::solvers::Fit;
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
@@ -284,9 +284,8 @@ fn finer_knots_never_raise_the_optimum() {
                             basis.project(&problem.system.grid, values).unwrap()
                         })
                         .collect();
-                    let settings = kmcfit_core::internals::solvers::FitSettings::default();
-                    kmcfit_core::internals::solvers::fit(&problem, &theta, &settings, &mut |_| {})
-                        .unwrap()
+                    let settings = kmcfit_core::solvers::FitSettings::default();
+                    kmcfit_core::solvers::fit(&problem, &theta, &settings, &mut |_| {}).unwrap()
                 }
             };
             if let Some(coarse) = &start {

@@ -2,8 +2,8 @@
 
 use crate::common;
 
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 
 fn settings(stopping: Stopping) -> FitSettings {
     FitSettings {
@@ -11,7 +11,7 @@ fn settings(stopping: Stopping) -> FitSettings {
         initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping,
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }

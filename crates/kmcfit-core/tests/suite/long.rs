@@ -2,15 +2,14 @@
 //! cent of noise, from a constant stiffness that is off by a factor of three.
 
 use crate::common::synthetic::{Truth, cramer_rao, rms, settings, with_noise};
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter,
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, ScalarParameter, uniform_knots,
 };
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::solvers::{Fit, fit_with_noise};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::solvers::{Fit, fit_with_noise};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Grid, Method, NodalCoefficients, State, System};
 use std::f64::consts::{PI, TAU};
 
 /// From 1 Hz to 2 Hz in 200 s: 300 periods.

@@ -2,11 +2,11 @@
 //! 1 % noise on the displacement, data by an independent integrator. Seeds are 0, 1, 2, ...
 
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{FitSettings, MissingTerm, Solver, fit, missing_terms};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{FitSettings, MissingTerm, Solver, fit, missing_terms};
+use kmcfit_core::structure::CoefficientKind;
 use std::f64::consts::TAU;
 
 const MASS: f64 = 2.0;

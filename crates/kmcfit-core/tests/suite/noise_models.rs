@@ -5,16 +5,16 @@
 
 use crate::common::counts::{least_held, seeds, widened};
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::diagnostics::student_half_width;
-use kmcfit_core::internals::noise::Correlation;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::diagnostics::student_half_width;
+use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::noise::Correlation;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{
     ChannelKind, Loss, NoiseEstimate, NoiseModel, ScoreCovariance, Weighting,
 };
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
-use kmcfit_core::internals::system::Method;
-use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::system::Method;
 use std::f64::consts::TAU;
 
 const TRUTH: [f64; 3] = [2.0, 0.06 * TAU * 2.0, TAU * TAU * 2.0];

@@ -2,14 +2,14 @@
 
 use crate::common::forced::{broadband, response, white};
 use crate::common::synthetic::{Truth, cramer_rao, rms, run, with_noise};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::step::Trajectory;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::functions::{CoefficientFunction, Parameterization};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::step::Trajectory;
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 const NOISE: f64 = 0.01;
 fn rest() -> State {

@@ -3,13 +3,12 @@
 use crate::common;
 
 use crate::common::synthetic::{settings, with_noise};
-use kmcfit_core::internals::functions::{
-    CoefficientFunction, CoefficientKind, ScalarParameter, ScalarValue,
-};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Sensor;
-use kmcfit_core::internals::solvers::{FitSettings, Solver, Stopping, fit_from};
-use kmcfit_core::internals::system::{Method, NodalCoefficients};
+use kmcfit_core::functions::{CoefficientFunction, ScalarParameter, ScalarValue};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::Sensor;
+use kmcfit_core::solvers::{FitSettings, Solver, Stopping, fit_from};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 /// Fraction of the slope by which a step must lower J (Armijo).

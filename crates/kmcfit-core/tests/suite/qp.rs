@@ -1,7 +1,7 @@
 //! Convex subproblems against solutions by independent methods.
 
-use kmcfit_core::internals::constraints::{Cone, Constraints, RowGroup, Rows};
-use kmcfit_core::internals::qp::{ConicStatus, Subproblem, project};
+use kmcfit_core::constraints::{Cone, Constraints, RowGroup, Rows};
+use kmcfit_core::qp::{ConicStatus, Subproblem, project};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 

@@ -6,7 +6,7 @@
 //! `KMCFIT_QP_SEED` selects other programs.
 
 use crate::rational::{Program, Row};
-use kmcfit_core::internals::qp::{ConicStatus, Subproblem};
+use kmcfit_core::qp::{ConicStatus, Subproblem};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -16,7 +16,7 @@ const PROGRAMS: u64 = 500;
 const REFUSALS: usize = 5;
 /// Accuracy of the minimum, relative to the larger of it and the cost at zero.
 const COST: f64 = 1e-9;
-/// Accuracy of the constraints, relative to the natural sizes of the terms of their rows: that of a solution ([`kmcfit_core::internals::qp::Kkt::VIOLATION`]).
+/// Accuracy of the constraints, relative to the natural sizes of the terms of their rows: that of a solution ([`kmcfit_core::qp::Kkt::VIOLATION`]).
 const ROWS: f64 = 1e-8;
 /// Largest exponent of two of a scale: twelve decades from the smallest to the largest.
 const OCTAVES: i32 = 20;

@@ -3,13 +3,13 @@
 use crate::common;
 
 use crate::common::closed_form::Bessel;
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind, Ratio};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
-use kmcfit_core::internals::step::Driven;
-use kmcfit_core::internals::system::{Method, NodalCoefficients, System};
+use kmcfit_core::functions::{Basis, CoefficientFunction, Ratio, uniform_knots};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::step::Driven;
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients, System};
 
 fn settings(initial: Initial) -> FitSettings {
     FitSettings {
@@ -20,7 +20,7 @@ fn settings(initial: Initial) -> FitSettings {
             tolerance: Some(1e-12),
             ..Stopping::exactly(100)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }
@@ -184,9 +184,9 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
         .map(|j| {
             let mut unit = vec![0.0; theta.len()];
             unit[j] = 1.0;
-            let direction = kmcfit_core::internals::system::SystemTangent {
+            let direction = kmcfit_core::system::SystemTangent {
                 nodal: problem.functions.direction(&unit, 0),
-                initial: kmcfit_core::internals::system::State::one(0.0, 0.0),
+                initial: kmcfit_core::system::State::one(0.0, 0.0),
             };
             let response = &here.trajectories[0];
             let driven = Driven {

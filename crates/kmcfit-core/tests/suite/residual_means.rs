@@ -3,12 +3,12 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{Doubt, FitAssessment};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::assessment::{Doubt, FitAssessment};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::{CoefficientSpec, ScalarSpec, SensorSpec};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 1000;

@@ -2,14 +2,12 @@
 //! time. 25 periods of 1 Hz at 20 samples per period, 1 % noise of the first amplitude, data by an independent integrator. Seeds are 0, 1, 2, ...
 
 use crate::common::forced::{response, white};
-use kmcfit_core::internals::assessment::{
-    Doubt, FitAssessment, function_summaries, verdict_reasons,
-};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::identifiability::ClassificationKind;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{FitSettings, Initial, fit_with_noise};
+use kmcfit_core::assessment::{Doubt, FitAssessment, function_summaries, verdict_reasons};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::identifiability::ClassificationKind;
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{FitSettings, Initial, fit_with_noise};
 use std::f64::consts::TAU;
 
 const STIFFNESS: f64 = TAU * TAU;

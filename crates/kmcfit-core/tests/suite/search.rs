@@ -5,11 +5,11 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::{BasisName, CoefficientSpec, KnotSpec, StartSpec};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -5,15 +5,15 @@
 
 use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::assessment::BasisTest;
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::functions::WeightRule;
-use kmcfit_core::internals::identifiability::{Bands, Classification, classify_functions};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, choose_weight, fit_with_noise};
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::assessment::BasisTest;
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::functions::WeightRule;
+use kmcfit_core::identifiability::{Bands, Classification, classify_functions};
 use kmcfit_core::model::{AutoWord, CoefficientSpec, KnotSpec, PenaltySpec, WeightChoice};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::solvers::{Fit, FitSettings, choose_weight, fit_with_noise};
+use kmcfit_core::system::Method;
 use std::f64::consts::TAU;
 
 const MASS: f64 = 2.0;

@@ -2,13 +2,13 @@
 
 use crate::common;
 
-use kmcfit_core::internals::constraints::{RowGroup, TOLERANCE};
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::constraints::{RowGroup, TOLERANCE};
+use kmcfit_core::functions::{Basis, CoefficientFunction, uniform_knots};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::Method;
 
 const NODES: usize = 201;
 
@@ -48,7 +48,7 @@ fn run(problem: &Problem) -> Fit {
             tolerance: Some(1e-13),
             ..Stopping::exactly(200)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     let start = problem.functions.start();

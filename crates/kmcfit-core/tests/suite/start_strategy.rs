@@ -2,15 +2,13 @@
 
 use crate::common;
 
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Experiment, Weighting};
-use kmcfit_core::internals::solvers::{
-    FitSettings, Initial, Solver, Status, Stopping, fit, fit_from,
-};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::functions::{CoefficientFunction, Parameterization};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Experiment, Weighting};
+use kmcfit_core::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit, fit_from};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 /// Nodes from one sample to the next.
 const STRIDE: usize = 20;
@@ -64,7 +62,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
             tolerance: Some(1e-12),
             ..Stopping::exactly(100)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     let start = problem.functions.start();
@@ -255,7 +253,7 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
             tolerance: Some(1e-10),
             ..Stopping::exactly(20)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     };
     let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();

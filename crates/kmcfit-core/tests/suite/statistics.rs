@@ -1,19 +1,18 @@
 //! Covariances and sigmas of estimates under Gaussian noise and with outliers, without bounds and penalties.
 
 use crate::common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, Ratio, ScalarParameter, ScalarValue,
+    uniform_knots,
 };
-use kmcfit_core::internals::identifiability::Bands;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
-use kmcfit_core::internals::solvers::fit_with_noise;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::identifiability::Bands;
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
+use kmcfit_core::solvers::fit_with_noise;
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -2,21 +2,20 @@
 
 use crate::common::forced::{broadband, rms, white};
 use crate::common::synthetic::with_noise;
-use kmcfit_core::internals::assessment::FitAssessment;
-use kmcfit_core::internals::constraints::{Constraints, RowGroup, TOLERANCE};
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization, ScalarParameter,
-    ScalarValue,
+use kmcfit_core::assessment::FitAssessment;
+use kmcfit_core::constraints::{Constraints, RowGroup, TOLERANCE};
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, CoefficientSet, Parameterization, ScalarParameter, ScalarValue,
 };
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{
     Channel, ChannelKind, Experiment, InputNoise, InputNoiseKind, Sensor, Weighting,
 };
-use kmcfit_core::internals::signal::Interpolation;
-use kmcfit_core::internals::solvers::{FitSettings, QpSolver, Status, fit, fit_with_noise};
-use kmcfit_core::internals::structure::{Ends, Law, Structure};
-use kmcfit_core::internals::system::{
+use kmcfit_core::signal::Interpolation;
+use kmcfit_core::solvers::{FitSettings, QpSolver, Status, fit, fit_with_noise};
+use kmcfit_core::structure::{CoefficientKind, Ends, Law, Structure};
+use kmcfit_core::system::{
     Excitation, Grid, InputQuantity, Method, NodalCoefficients, StageSamples, State, SupportMotion,
     System,
 };

@@ -5,15 +5,15 @@ use crate::common;
 
 use crate::common::counts::{seeds, widened};
 use crate::common::synthetic::with_noise;
-use kmcfit_core::internals::assessment::FitAssessment;
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::functions::WeightRule;
-use kmcfit_core::internals::identifiability::{Classification, Condition};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, Status, WeightPath, choose_weight};
+use kmcfit_core::assessment::FitAssessment;
+use kmcfit_core::builder::{Builder, Record};
+use kmcfit_core::functions::WeightRule;
+use kmcfit_core::identifiability::{Classification, Condition};
 use kmcfit_core::model::{
     BasisName, CoefficientSpec, KnotSpec, PenaltySpec, StartSpec, WeightChoice,
 };
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, Status, WeightPath, choose_weight};
 use std::ops::Range;
 
 const MASS: f64 = 1.0;

@@ -2,14 +2,14 @@
 //! integrator.
 
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{
+use kmcfit_core::assessment::{
     Doubt, EstimateStatus, FitAssessment, VerdictAssumption, estimates, verdict_assumptions,
     verdict_reasons,
 };
-use kmcfit_core::internals::builder::{Builder, Record};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
+use kmcfit_core::builder::{Builder, Record};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{Fit, FitSettings, fit_with_noise};
 use std::f64::consts::TAU;
 
 const SPACING: f64 = 0.05;
@@ -213,8 +213,7 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
         ["natural_frequency", "damping_ratio", "k_over_m", "c_over_m"]
     );
     let status = |all: &[(String, _)], name: &str| {
-        let of =
-            |(known, _): &&(String, kmcfit_core::internals::assessment::Estimate)| known == name;
+        let of = |(known, _): &&(String, kmcfit_core::assessment::Estimate)| known == name;
         all.iter().find(of).expect("an estimate").1.status
     };
     assert_eq!(status(&assumed, "mass"), EstimateStatus::Fixed);

@@ -3,13 +3,12 @@
 use crate::common;
 use crate::common::counts::seeds;
 
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Ratio, WeightRule};
-use kmcfit_core::internals::objective::GradientKind;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{
-    FitSettings, Initial, Solver, Stopping, WeightPath, choose_weight,
-};
-use kmcfit_core::internals::system::{Method, NodalCoefficients};
+use kmcfit_core::functions::{CoefficientFunction, Ratio, WeightRule};
+use kmcfit_core::objective::GradientKind;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::solvers::{FitSettings, Initial, Solver, Stopping, WeightPath, choose_weight};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::{Method, NodalCoefficients};
 use std::ops::RangeInclusive;
 
 const SIGMA: f64 = 0.1;
@@ -41,7 +40,7 @@ fn settings() -> FitSettings {
             tolerance: Some(1e-5),
             ..Stopping::exactly(40)
         },
-        qp: kmcfit_core::QpSolver::Auto,
+        qp: kmcfit_core::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }

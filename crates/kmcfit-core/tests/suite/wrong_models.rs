@@ -7,17 +7,17 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::internals::assessment::{
+use kmcfit_core::assessment::{
     ClassicalEstimate, Doubt, FitAssessment, RecordError, VerdictLevel, estimates, verdict_reasons,
 };
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, NoiseModel, Weighting};
-use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
-use kmcfit_core::internals::system::InputSample;
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::model::{CoefficientSpec, ScalarSpec};
+use kmcfit_core::objective::Evaluation;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, NoiseModel, Weighting};
+use kmcfit_core::solvers::{FitSettings, fit_with_noise};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::InputSample;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

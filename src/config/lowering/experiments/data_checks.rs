@@ -7,17 +7,17 @@ use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
-use kmcfit_core::internals::assessment::{Doubt, Severity};
-use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::record::{ChannelKind, Loss};
-use kmcfit_core::internals::signal::{
+use kmcfit_core::assessment::{Doubt, Severity};
+use kmcfit_core::diagnostics::{detrended, outlier_indices, standard_deviation};
+use kmcfit_core::model::{ExperimentSpec, InitialSpec, KnownValue, ScalarSpec};
+use kmcfit_core::record::{ChannelKind, Loss};
+use kmcfit_core::signal::{
     Interpolation, Signal, Spectrum, driven_oscillator, is_kept_up, median, onset,
     two_forced_modes, two_modes,
 };
-use kmcfit_core::internals::system::round_time;
-use kmcfit_core::internals::threads::both;
-use kmcfit_core::model::{ExperimentSpec, InitialSpec, KnownValue, ScalarSpec};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::system::round_time;
+use kmcfit_core::threads::both;
 use serde_json::json;
 use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};

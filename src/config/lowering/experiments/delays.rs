@@ -5,9 +5,9 @@ use super::{Entry, RawRecord};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::number_format::significant;
-use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::system::Grid;
 use kmcfit_core::model::{DelayValue, ExperimentSpec, InputSensorSpec};
+use kmcfit_core::record::{ChannelKind, Weighting};
+use kmcfit_core::system::Grid;
 use serde_json::json;
 use std::sync::Arc;
 

@@ -7,9 +7,9 @@ use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::units::Measurand;
-use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
-use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use kmcfit_core::model::{ExperimentSpec, ForceShape, ForceSpec};
+use kmcfit_core::record::{BaseMotion, Input, Waveform};
+use kmcfit_core::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use std::ops::Range;
 
 /// Reads the excitation of an experiment.

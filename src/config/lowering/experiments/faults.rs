@@ -9,12 +9,12 @@ use super::data_facts::{
 use crate::finding::Finding;
 use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
-use kmcfit_core::internals::assessment::{Doubt, Severity};
-use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
-use kmcfit_core::internals::system::round_time;
-use kmcfit_core::internals::threads::{available_for, both};
+use kmcfit_core::assessment::{Doubt, Severity};
+use kmcfit_core::diagnostics::standard_deviation;
 use kmcfit_core::model::FaultName;
+use kmcfit_core::signal::{cut_off, dropouts, median, quantisation, spikes};
+use kmcfit_core::system::round_time;
+use kmcfit_core::threads::{available_for, both};
 use serde_json::json;
 
 /// Spacing, in median spacings, above which samples are missing.

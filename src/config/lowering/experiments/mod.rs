@@ -21,16 +21,14 @@ pub(in crate::config) use channel::sensor_of;
 pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
 pub(in crate::config) use excitation::known_stretches;
-use kmcfit_core::internals::builder::{self, ChannelSpec, listed};
-use kmcfit_core::internals::functions::ScalarParameter;
-use kmcfit_core::internals::record::{
-    BaseMotion, ChannelKind, Experiment, Input, InputNoiseKind, Waveform,
-};
-use kmcfit_core::internals::signal::Signal;
-use kmcfit_core::internals::system::{Grid, InputQuantity};
+use kmcfit_core::builder::{ChannelSpec, Record, listed};
+use kmcfit_core::functions::ScalarParameter;
 use kmcfit_core::model::{
     DelayValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec, ScalarSpec,
 };
+use kmcfit_core::record::{BaseMotion, ChannelKind, Experiment, Input, InputNoiseKind, Waveform};
+use kmcfit_core::signal::Signal;
+use kmcfit_core::system::{Grid, InputQuantity};
 use std::sync::Arc;
 
 pub(super) use data_checks::MISSING_CODES;
@@ -259,13 +257,13 @@ pub(super) fn specification(
     grid: &Grid,
     record: Option<RawRecord>,
     defaults: functions::Defaults<'_>,
-) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
+) -> Result<(Record, Vec<ChannelNote>), InputError> {
     let spec = entry.spec;
     let initial = match &spec.initial {
         InitialSpec::Scalar(_) => [ScalarSpec::ESTIMATED; 2],
         InitialSpec::Map(state) => [state.displacement, state.velocity],
     };
-    let mut found = builder::Record::new(entry.name()).initial(initial);
+    let mut found = Record::new(entry.name()).initial(initial);
     if is_held_out(spec) {
         found = found.validation();
     }

@@ -5,7 +5,7 @@ use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
 use crate::units::{Measurand, ScaledUnit, Unit};
-use kmcfit_core::internals::assessment::Severity;
+use kmcfit_core::assessment::Severity;
 use serde_json::json;
 
 /// Kind of the statement of a unit that neither the model nor the file states; it stands beside a result, and is no warning.

@@ -12,8 +12,8 @@ use super::FinerNodes;
 use crate::config::lowering::experiments::RawRecord;
 use crate::finding::Finding;
 use crate::number_format::significant;
-use kmcfit_core::internals::signal::Spectrum;
-use kmcfit_core::internals::system::Method;
+use kmcfit_core::signal::Spectrum;
+use kmcfit_core::system::Method;
 use std::f64::consts::TAU;
 
 /// Smallest and largest target of the phase error at the end of the record, rad: the largest error of the response relative to its

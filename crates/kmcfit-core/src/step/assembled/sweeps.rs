@@ -96,15 +96,6 @@ impl<'a> Motion<'a> {
         Steps::new(self.structure, self.method, self.step, 0.0)
     }
 
-    /// Largest stable step, s, by the linear springs and dampers with their largest coefficients and the least inertias; infinite for the
-    /// implicit method. `None` where the mass matrix is not positive definite.
-    pub fn largest_stable_step(&self) -> Option<f64> {
-        let rate = self
-            .structure
-            .largest_rate_of(self.functions.iter().copied())?;
-        Some(self.method.stability_limit() / rate)
-    }
-
     fn error(node: usize, unsolved: Unsolved) -> MotionError {
         let cause = match unsolved {
             Unsolved::Mass => Cause::Mass,
@@ -114,7 +105,7 @@ impl<'a> Motion<'a> {
     }
 
     /// Response from the state `initial`: the displacements of all coordinates, then their velocities. `states` gives the number of nodes.
-    /// Up to [`Motion::largest_stable_step`] explicit steps let no motion grow that decays; whether they are longer is not tested here.
+    /// Whether explicit steps are short enough to be stable is not tested here.
     ///
     /// # Errors
     /// A [`MotionError`] if the mass matrix is not positive definite, an implicit step is not solved, or the response overflows.
@@ -191,24 +182,14 @@ impl<'a> Motion<'a> {
         Ok(y)
     }
 
-    /// Derivative of the response `states` along changes of the functions' values at the nodes and of the initial state.
+    /// Derivatives of the response `states` along changes of the functions' values at the nodes and of the initial state, for each of
+    /// several directions, which share the linearised steps.
     ///
     /// # Errors
     /// As [`Motion::respond`].
     ///
     /// # Panics
     /// If the arguments do not fit the structure.
-    pub fn tangent(
-        &self,
-        states: &Trajectory,
-        functions: &[&[f64]],
-        initial: &[f64],
-    ) -> Result<Trajectory, MotionError> {
-        let mut all = self.tangents(states, &[(functions, initial)])?;
-        Ok(all.remove(0))
-    }
-
-    /// [`Motion::tangent`] along several directions, which share the linearised steps.
     pub(crate) fn tangents(
         &self,
         states: &Trajectory,

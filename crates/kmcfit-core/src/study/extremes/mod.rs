@@ -24,7 +24,7 @@
 mod envelope;
 mod search;
 
-pub use envelope::{Envelope, envelopes, is_within_rounding};
+pub use envelope::{envelopes, is_within_rounding};
 
 use crate::functions::Penalty;
 use crate::identifiability::{Curve, Target};

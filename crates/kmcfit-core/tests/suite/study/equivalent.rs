@@ -1,9 +1,7 @@
-use kmcfit_core::internals::qp::ConicStatus;
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::study::equivalent_coefficients::{
-    EquivalentOptions, TargetResponse, equivalent_coefficients,
-};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::qp::ConicStatus;
+use kmcfit_core::structure::{Law, Structure};
+use kmcfit_core::study::{EquivalentOptions, TargetResponse, equivalent_coefficients};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,17 +1,16 @@
 use super::problems::{linear, regular};
 use super::profile::error;
 use crate::common::{csv, initial, paper_problem, paper_system, shared};
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{Basis, Penalty, Ratio};
-use kmcfit_core::internals::identifiability::{Curve, Target};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Loss;
-use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::extremes::{
-    ExtremeStatus, MisfitLimit, extreme, extreme_pairs, is_within_rounding, values_at,
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{Basis, Penalty, Ratio};
+use kmcfit_core::identifiability::{Curve, Target};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::Loss;
+use kmcfit_core::solvers::fit_from;
+use kmcfit_core::study::{
+    ExtremeStatus, MisfitLimit, ProfileSettings, QUANTILE_95, extreme, extreme_pairs,
+    is_within_rounding, profile, values_at,
 };
-use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
-use kmcfit_core::internals::study::{ProfileSettings, profile};
 
 fn optimum(problem: &Problem) -> (Vec<f64>, f64) {
     let settings = crate::common::synthetic::settings();
@@ -191,8 +190,7 @@ fn ratios_have_extremes_of_their_own() {
     let system = problem.system.clone();
     let n = system.grid.nodes();
     let list = super::problems::constants(n, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
-    let functions =
-        kmcfit_core::internals::functions::Parameterization::new(list, n, system.grid.step());
+    let functions = kmcfit_core::functions::Parameterization::new(list, n, system.grid.step());
     let problem = problem
         .with(|parts| parts.functions = functions.unwrap())
         .unwrap();

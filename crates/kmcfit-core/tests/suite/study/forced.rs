@@ -1,17 +1,15 @@
 //! Predictions under a new force: coverage of their bands.
 
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientSet};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{
-    Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
-};
-use kmcfit_core::internals::signal::{Interpolation, Signal};
-use kmcfit_core::internals::solvers::{FitSettings, Initial, fit_with_noise};
-use kmcfit_core::internals::study::IdentifiedSystem;
-use kmcfit_core::internals::system::{Grid, State};
+use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::functions::{CoefficientFunction, CoefficientSet};
 use kmcfit_core::model::CoefficientSpec;
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, ChannelKind, Experiment, Input, Waveform, Weighting};
+use kmcfit_core::signal::{Interpolation, Signal};
+use kmcfit_core::solvers::{FitSettings, Initial, fit_with_noise};
+use kmcfit_core::study::IdentifiedSystem;
+use kmcfit_core::system::{Grid, State};
 use std::f64::consts::TAU;
 
 const MASS: f64 = 2.0;

@@ -1,7 +1,7 @@
 use super::problems::{Record, bound, constants, nodal, problem, rest, samples, system};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Weighting;
-use kmcfit_core::internals::study::multistart::{Multistart, Ranges, multistart};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::Weighting;
+use kmcfit_core::study::{Multistart, Ranges, multistart};
 
 /// One sample per second of an undamped response from rest, `cos(w n)`: the frequencies
 /// `2 pi j +- w` give the same samples. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
@@ -81,7 +81,7 @@ fn the_threads_change_no_bit() {
     let problem = aliased(0.02);
     let [one, two] = [1, 2].map(|threads| multistart(&problem, &how(threads)));
     assert_eq!(one.order, two.order);
-    let bits = |w: &kmcfit_core::internals::study::multistart::Waterfall| -> Vec<u64> {
+    let bits = |w: &kmcfit_core::study::Waterfall| -> Vec<u64> {
         w.runs
             .iter()
             .map(|r| r.found.as_ref().unwrap().parameters[0].to_bits())

@@ -1,13 +1,10 @@
 use super::problems::regular;
 use crate::common;
-use kmcfit_core::internals::functions::Ratio;
-use kmcfit_core::internals::functions::{Basis, Penalty};
-use kmcfit_core::internals::identifiability::{Curve, Target};
-use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
-use kmcfit_core::internals::study::prediction::{PredictionCase, predict};
-use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
-use kmcfit_core::internals::system::{Excitation, State};
+use kmcfit_core::functions::{Basis, Penalty, Ratio};
+use kmcfit_core::identifiability::{Curve, Target};
+use kmcfit_core::solvers::fit_from;
+use kmcfit_core::study::{MisfitLimit, PredictionCase, QUANTILE_95, extreme_pairs};
+use kmcfit_core::system::{Excitation, State};
 
 /// The band is as wide as the spread of the responses of refitted systems. The envelope over the extreme systems, at the ends of
 /// the same ellipse, is slightly narrower than the band where the response depends on both parameters, and never wider.
@@ -41,14 +38,9 @@ fn the_band_of_a_prediction_agrees_with_refits() {
     )
     .unwrap();
     let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
-    let found = predict(
-        &problem,
-        &best.parameters,
-        &run,
-        Some(&covariance),
-        &extremes,
-    )
-    .unwrap();
+    let found = run
+        .predict(&problem, &best.parameters, Some(&covariance), &extremes)
+        .unwrap();
     let band = found.band.as_ref().unwrap();
     let worst = found.worst.as_ref().unwrap();
     assert!(found.unbounded.is_empty());
@@ -61,7 +53,7 @@ fn the_band_of_a_prediction_agrees_with_refits() {
                 .unwrap()
                 .best
                 .parameters;
-            let found = predict(&problem, &theta, &run, None, &[]).unwrap();
+            let found = run.predict(&problem, &theta, None, &[]).unwrap();
             found.response.displacement(0).to_vec()
         })
         .collect();
@@ -128,7 +120,7 @@ fn systems_of_equal_fit_differ_in_prediction() {
     let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
     let distance = |displacement: f64, velocity: f64| {
         let run = PredictionCase::free("other", State::one(displacement, velocity));
-        let found = predict(&problem, &truth, &run, None, &extremes).unwrap();
+        let found = run.predict(&problem, &truth, None, &extremes).unwrap();
         let worst = found.worst.unwrap();
         let response = found.response.displacement(0);
         let inside = worst

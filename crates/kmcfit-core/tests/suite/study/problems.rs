@@ -1,14 +1,13 @@
 //! Small problems with few parameters.
 
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter,
-    ScalarValue,
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{
+    Basis, CoefficientFunction, Parameterization, Prior, ScalarParameter, ScalarValue,
 };
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
-use kmcfit_core::internals::structure::{Law, Structure};
-use kmcfit_core::internals::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Experiment, Sensor, Weighting};
+use kmcfit_core::structure::{CoefficientKind, Law, Structure};
+use kmcfit_core::system::{Excitation, Grid, Method, NodalCoefficients, State, System};
 
 pub const SIGMA: f64 = 0.05;
 pub fn rest() -> State {

@@ -2,18 +2,17 @@ use super::problems::knots;
 use super::problems::{
     Record, bound, constants, linear, nodal, problem, regular, samples, scalar, system,
 };
-use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Penalty, ScalarValue,
+use kmcfit_core::constraints::RowGroup;
+use kmcfit_core::functions::{Basis, CoefficientFunction, Penalty, ScalarValue};
+use kmcfit_core::identifiability::{Curve, Target};
+use kmcfit_core::problem::Problem;
+use kmcfit_core::record::{Channel, Sensor, Weighting};
+use kmcfit_core::solvers::{fit, fit_from};
+use kmcfit_core::structure::CoefficientKind;
+use kmcfit_core::study::{
+    End, Interval, MisfitLimit, Profile, ProfileSettings, QUANTILE_95, extreme_pairs, profile,
 };
-use kmcfit_core::internals::identifiability::{Curve, Target};
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
-use kmcfit_core::internals::solvers::{fit, fit_from};
-use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
-use kmcfit_core::internals::study::profile_likelihood::{End, Interval, QUANTILE_95};
-use kmcfit_core::internals::study::{Profile, ProfileSettings, profile};
-use kmcfit_core::internals::system::{Excitation, Method};
+use kmcfit_core::system::{Excitation, Method};
 use nalgebra::DMatrix;
 
 fn optimum(problem: &Problem) -> Vec<f64> {

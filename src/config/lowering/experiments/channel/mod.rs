@@ -12,14 +12,13 @@ use crate::config::lowering::experiments::Entry;
 use crate::error::InputError;
 use crate::number_format::{count, significant};
 use crate::units::Unit;
-use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
-use kmcfit_core::internals::signal::SecondOrder;
-use kmcfit_core::internals::signal::{even_spacing, median_spacing};
-use kmcfit_core::internals::system::Grid;
 use kmcfit_core::model::{
     ColumnId, ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec,
     ScalarOr, SensorSpec, SigmaValue,
 };
+use kmcfit_core::record::{ChannelKind, Loss, NoiseModel, Weighting};
+use kmcfit_core::signal::{SecondOrder, even_spacing, median_spacing};
+use kmcfit_core::system::Grid;
 use noise::{loss, noise_model, weighting, with_quantisation};
 use sampling::{band, decimate};
 use std::sync::Arc;

@@ -5,8 +5,8 @@ use super::Spec;
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::number_format::significant;
-use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
 use kmcfit_core::model::{CorrelationName, LossName, ScalarOr, SigmaValue};
+use kmcfit_core::record::{Loss, NoiseModel, Weighting};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
 const HUBER: f64 = 1.345;

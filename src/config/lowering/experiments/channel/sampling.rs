@@ -4,9 +4,8 @@ use super::super::column_samples;
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::number_format::count;
-use kmcfit_core::internals::signal::even_spacing;
-use kmcfit_core::internals::signal::{self, SecondOrder};
 use kmcfit_core::model::ExperimentSpec;
+use kmcfit_core::signal::{SecondOrder, band_pass, even_spacing, high_pass, low_pass};
 
 /// Order of the filter of a band, run forward and backward.
 const BAND_ORDER: usize = 2;
@@ -36,7 +35,7 @@ pub(super) fn decimate(
             .expected("no `decimate`, or a window without gaps"));
     }
     let before = source.values.len();
-    source.values = signal::decimate(&source.values, factor);
+    source.values = kmcfit_core::signal::decimate(&source.values, factor);
     source.times = source.times.iter().copied().step_by(factor).collect();
     if let Some(beside) = &mut source.beside {
         *beside = beside.iter().copied().step_by(factor).collect();
@@ -71,9 +70,9 @@ pub(super) fn band(
     let rate = 1.0 / spacing;
     let (low, high) = (band.min, band.max);
     let sections = match (low, high) {
-        (Some(low), Some(high)) => signal::band_pass(BAND_ORDER, low, high, rate),
-        (Some(low), None) => signal::high_pass(BAND_ORDER, low, rate),
-        (None, Some(high)) => signal::low_pass(BAND_ORDER, high, rate),
+        (Some(low), Some(high)) => band_pass(BAND_ORDER, low, high, rate),
+        (Some(low), None) => high_pass(BAND_ORDER, low, rate),
+        (None, Some(high)) => low_pass(BAND_ORDER, high, rate),
         (None, None) => None,
     };
     sections.ok_or_else(|| {
