@@ -7,9 +7,9 @@ pub mod assessment {
         ClassicalMethod, CoarseBasis, Doubt, EXACT, EquationErrorIntervals, Estimate,
         EstimateErrors, EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics,
         FunctionSummary, Implausible, ModelTests, NoIntervals, POOR, Parts, Plausibility,
-        RecordError, ResidualPattern, Severity, StepCheck, TruthErrors, Unidentified,
-        VerdictAssumption, VerdictLevel, all_diagnostics, estimates, function_summaries, outliers,
-        pattern, quantities_of_many, verdict_assumptions, verdict_reasons,
+        RecordError, ResidualPattern, Severity, StepCheck, TruthErrors, Unidentified, VerdictLevel,
+        all_diagnostics, estimates, function_summaries, outliers, pattern, quantities_of_many,
+        verdict_assumptions, verdict_reasons,
     };
 }
 pub mod builder {
@@ -27,6 +27,9 @@ pub mod diagnostics {
         ResidualDiagnostics, SIGNIFICANCE, Whiteness, chi_square_one, detrended, normal_half_width,
         offset_and_drift, outlier_indices, rms, standard_deviation, student_half_width,
     };
+}
+pub mod finding {
+    pub use crate::finding::Finding;
 }
 pub mod functions {
     pub use crate::functions::{
@@ -59,7 +62,9 @@ pub mod noise {
     pub use crate::noise::{Correlation, CorrelationLaw, automatic_bandwidth};
 }
 pub mod number_format {
-    pub use crate::number_format::{at_most, number_or_nan, significant};
+    pub use crate::number_format::{
+        and_list, at_most, count, number_or_nan, percent, resolved, significant, times_in_words,
+    };
 }
 pub mod record {
     pub use crate::record::{

@@ -62,6 +62,7 @@ mod assessment;
 mod builder;
 mod constraints;
 mod diagnostics;
+mod finding;
 mod functions;
 mod host;
 mod identifiability;
