@@ -27,7 +27,6 @@ pub mod config;
 pub mod digest;
 pub mod error;
 mod escape;
-pub mod finding;
 pub mod fitting;
 #[cfg(feature = "program")]
 pub mod fleet;
@@ -36,7 +35,6 @@ pub mod guide;
 mod headings;
 mod magnitudes;
 mod memory;
-mod number_format;
 pub mod quantity_names;
 pub mod report;
 pub mod results;
@@ -46,4 +44,6 @@ mod text_io;
 pub mod units;
 
 pub use analysis::{Analysis, analyse};
+pub use kmcfit_core::finding;
+use kmcfit_core::number_format;
 pub use report::Run;

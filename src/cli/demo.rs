@@ -140,7 +140,10 @@ fn screen(comparison: &Comparison) -> String {
 }
 
 fn first_reason(verdict: &Verdict) -> String {
-    let reason = verdict.reasons.first().map_or(&verdict.passed, |r| &r.text);
+    let reason = verdict
+        .reasons
+        .first()
+        .map_or(&verdict.passed, |r| &r.sentence);
     let reason = reason.split([';', ':']).next().unwrap_or_default();
     format!("{}: {reason}", level_in_words(verdict.level))
 }

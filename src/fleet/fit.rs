@@ -146,7 +146,7 @@ fn fitted(
     let document = completed.fitted(RequestedFiles::default()).document();
     let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
     let findings = reasons.chain(&document.warnings);
-    let mut warnings: Vec<String> = findings.map(|finding| finding.text.clone()).collect();
+    let mut warnings: Vec<String> = findings.map(|finding| finding.sentence.clone()).collect();
     let mut seen = HashSet::new();
     warnings.retain(|text| seen.insert(text.clone()));
     Ok(Some(Row {

@@ -2,12 +2,13 @@
 
 use super::assumptions::assumptions;
 use super::document::IdentifiabilitySummary;
+use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
-use super::{doubts, findings};
 use crate::finding::Finding;
 use crate::number_format::resolved;
-use kmcfit_core::assessment::{Doubt, FunctionSummary, Severity, function_summaries};
+use kmcfit_core::assessment::{Doubt, FunctionSummary, function_summaries};
+use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{
     Classification, FunctionClassification, Target, structural_rank,
 };
@@ -39,7 +40,7 @@ impl FittedModel<'_> {
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
             summary.unidentified = true;
-            found.push(doubts::unidentified(reason).rated(Severity::Inadequate));
+            found.push(Finding::of(reason, reason.sentence()).rated(Severity::Inadequate));
             return (summary, found);
         }
         let classifications = &assessment.classifications;
@@ -72,11 +73,11 @@ impl FittedModel<'_> {
             is_damping && negative.is_some()
         };
         let warnings = plausibility.warnings.iter().filter(|w| !is_replaced(w));
-        warnings.for_each(|warning| found.push(doubts::doubt(warning)));
-        negative.clone().into_iter().for_each(|n| found.push(n));
+        found.extend(warnings.cloned().map(Finding::from));
+        found.extend(negative.clone());
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
-        poor.for_each(|doubt| found.push(doubts::doubt(&doubt)));
+        found.extend(poor.map(Finding::from));
         (summary, found)
     }
 
@@ -107,8 +108,7 @@ impl FittedModel<'_> {
         let biased = findings::equation_error(equation.as_ref().err());
         found.push(biased.rated(Severity::Warning));
         let missing = self.run_assessment.missing_terms.iter();
-        let missing = missing.map(|term| doubts::doubt(&Doubt::MissingTerm(*term)));
-        missing.for_each(|warning| found.push(warning));
+        found.extend(missing.map(|term| Finding::from(Doubt::MissingTerm(*term))));
         let Ok(intervals) = equation else {
             return;
         };

@@ -1,8 +1,7 @@
 //! Extent of the records of a fit, and the result of its validation, in words.
 
 use super::document::ResultDocument;
-use super::suggestions::percent;
-use crate::number_format::{count, significant};
+use crate::number_format::{count, percent, significant};
 use kmcfit_core::assessment::POOR;
 
 /// Number of samples, of several records with their number, and duration, of several records the longest; samples for validation apart.

@@ -1,10 +1,10 @@
 //! Overview of a model file before a fit: data as read, units, sampling, start values, what the samples can determine, and a verdict.
 
 use super::findings;
-use super::model_assumptions::assumed_units;
 use crate::config::{ChannelNote, Model};
 use crate::finding::Finding;
 use crate::number_format::significant;
+use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::standard_deviation;
 use kmcfit_core::functions::{CoefficientFunction, Ratio};
 use kmcfit_core::identifiability::{ScalingAmbiguity, Sensitivity, structural_rank};
@@ -27,7 +27,9 @@ pub fn overview(model: &Model) -> String {
         }
     }
     lines.extend(Finding::texts(&model.data));
-    lines.extend(assumed_units(model).map(|units| format!("units: {}", units.text)));
+    let assumed = model.assumptions();
+    let units = assumed.filter(|doubt| matches!(doubt, Doubt::UnitsAssumed { .. }));
+    lines.extend(units.map(|units| format!("units: {}", units.sentence())));
     let grid = &model.problem.system.grid;
     lines.push(format!(
         "{}: {} nodes over {} s ({}), {} parameters, {}",
@@ -143,7 +145,7 @@ fn identifiability(model: &Model, evaluation: Option<&Evaluation>) -> (Vec<Strin
     let count = structural_rank(problem);
     let findings = count.findings.iter();
     let mut lines: Vec<String> = findings
-        .map(|finding| findings::rank(finding).text)
+        .map(|finding| findings::rank(finding).sentence)
         .collect();
     if model.has_unknown_mass {
         lines.clear();

@@ -2,15 +2,13 @@
 
 use super::answer::answer_table;
 use super::document::{AttemptSummary, ChannelSummary, PenaltySummary, Prediction, ResultDocument};
-use super::doubts;
 use super::equation::equation_residual;
 use super::extent::{extent, validation};
-use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
-use super::suggestions::percent;
 use crate::finding::Finding;
-use crate::number_format::{count, resolved, significant};
-use kmcfit_core::assessment::ClassicalEstimate;
+use crate::number_format::{count, percent, resolved, significant};
+use kmcfit_core::assessment::{ClassicalEstimate, Doubt};
+use kmcfit_core::finding::Severity;
 use kmcfit_core::functions::WeightRule;
 use kmcfit_core::identifiability::Quantity;
 use std::fmt::Write;
@@ -54,8 +52,16 @@ fn answer(document: &ResultDocument, plot: Option<&str>) -> String {
     text += "\n";
     text += &plot.map_or(String::new(), |plot| format!("{plot}\n"));
     let lists = [
-        ("Mass", assumed(document, MASS_UNKNOWN)),
-        ("Units", assumed(document, UNITS_ASSUMED)),
+        (
+            "Mass",
+            assumed(document, |doubt| matches!(doubt, Doubt::MassUnknown)),
+        ),
+        (
+            "Units",
+            assumed(document, |doubt| {
+                matches!(doubt, Doubt::UnitsAssumed { .. })
+            }),
+        ),
         ("Fit", fit(document)),
         ("Truth", truth(document).into_iter().collect()),
         ("Data", data_lines(document)),
@@ -65,23 +71,20 @@ fn answer(document: &ResultDocument, plot: Option<&str>) -> String {
 }
 
 /// Assumptions of a kind.
-fn assumed(document: &ResultDocument, kind: &str) -> Vec<String> {
+fn assumed(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> Vec<String> {
     let all = document.verdict.iter().flat_map(|v| &v.assumptions);
-    let of_kind = all.filter(|assumption| assumption.kind == kind);
-    of_kind.map(|assumption| assumption.text.clone()).collect()
+    let of_kind = all.filter(|assumption| assumption.doubt.as_ref().is_some_and(&is_meant));
+    of_kind.map(Finding::to_string).collect()
 }
 
 /// What was done with the data, in one line, and the warnings about them.
 fn data_lines(document: &ResultDocument) -> Vec<String> {
-    let is_done = |fact: &&Finding| {
-        let action = fact.quantities.get("action").and_then(|a| a.as_str());
-        action != Some("used") && fact.kind != "quantisation"
-    };
-    let mut done = document.data.iter().filter(is_done);
+    let data = document.data.iter();
+    let mut done = data.filter(|fact| fact.severity > Severity::Detail);
     let more = done.clone().count().saturating_sub(1);
     let line = done.next().map(|first| match more {
-        0 => first.text.clone(),
-        _ => format!("{}; {more} more in result.json", first.text),
+        0 => first.sentence.clone(),
+        _ => format!("{}; {more} more in result.json", first.sentence),
     });
     let warnings = document.other_warnings(document.warnings.iter());
     line.into_iter().chain(warnings).collect()
@@ -170,7 +173,7 @@ fn fit(document: &ResultDocument) -> Vec<String> {
         !c.agrees || high - low <= UNSHARP * c.frequency
     };
     let classical = document.classical.as_ref().filter(is_sharp);
-    let classical = classical.map(doubts::classical);
+    let classical = classical.map(ClassicalEstimate::sentence);
     std::iter::once(text).chain(classical).collect()
 }
 

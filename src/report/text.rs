@@ -106,15 +106,6 @@ pub(crate) fn prose(text: &str) -> String {
     parts.collect()
 }
 
-/// `a, b and c`.
-pub fn and_list(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
-}
-
 /// Rows in columns of equal width, with two blanks between them.
 pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     aligned_to(rows, |_| false)

@@ -1,18 +1,17 @@
 //! Reasons of the verdict on a fit in words, each a clause of one line.
 
 use super::document::{Estimates, Verdict};
-use super::doubts::doubt;
 use super::fit_assessment::ValidationRecord;
-use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;
 use super::run::FittedModel;
-use super::text::and_list;
 use crate::finding::Finding;
+use crate::number_format::and_list;
 use kmcfit_core::assessment::{
-    Doubt, Estimate, EstimateStatus, Implausible, Severity, VerdictAssumption, VerdictLevel,
-    estimates, verdict_assumptions, verdict_reasons,
+    Doubt, Estimate, EstimateStatus, Implausible, VerdictLevel, estimates, verdict_assumptions,
+    verdict_reasons,
 };
 use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::finding::Severity;
 use kmcfit_core::functions::Ratio;
 use kmcfit_core::solvers::{EquationBalance, Status};
 
@@ -30,7 +29,8 @@ impl FittedModel<'_> {
         }
         // Codes in place of samples are no motion.
         let warnings = &self.model.warnings;
-        let has_codes = self.model.missing_codes().next().is_some();
+        let is_code = |doubt: &Doubt| matches!(doubt, Doubt::MissingCodes { .. });
+        let has_codes = self.model.doubts().any(is_code);
         let implausible = self.implausible().filter(|_| !has_codes);
         reasons.extend(implausible.map(Doubt::ImplausibleUnits));
         let balance = self.run_assessment.balance.as_ref();
@@ -47,23 +47,24 @@ impl FittedModel<'_> {
         let validation = self.run_assessment.validation.iter();
         reasons.extend(validation.filter_map(ValidationRecord::poor));
         let outcome = &self.fit.outcome;
-        let in_words = |reason: &Doubt| match reason {
+        let in_words = |reason: Doubt| match reason {
             // The end of the search has its own reason.
             Doubt::Failed { status } | Doubt::NotConverged { status } => {
-                let text = format!("{}: {}", status.name(), outcome.reason);
+                let sentence = format!("{}: {}", status.name(), outcome.reason);
                 Finding {
-                    text,
-                    ..doubt(reason)
+                    sentence,
+                    ..Finding::from(reason)
                 }
             }
             Doubt::RankDeficient { .. } if !problem.penalties.is_empty() => {
-                let mut finding = doubt(reason);
-                finding.text += " from the samples; penalties and constraints determine the others";
+                let mut finding = Finding::from(reason);
+                finding.sentence +=
+                    " from the samples; penalties and constraints determine the others";
                 finding
             }
-            _ => doubt(reason),
+            _ => reason.into(),
         };
-        let mut reasons: Vec<Finding> = reasons.iter().map(in_words).collect();
+        let mut reasons: Vec<Finding> = reasons.into_iter().map(in_words).collect();
         // What the fit shows as well has its own reason.
         let is_shown = |of_data: &Doubt| {
             let mut shown = reasons.iter().filter_map(|reason| reason.doubt.as_ref());
@@ -72,22 +73,21 @@ impl FittedModel<'_> {
                 _ => shown == of_data,
             })
         };
-        let of_data = warnings.iter().filter(|w| w.level >= Severity::Check);
+        let of_data = warnings.iter().filter(|w| w.severity >= Severity::Check);
         let of_data = of_data.filter(|w| !w.doubt.as_ref().is_some_and(is_shown));
         let of_data: Vec<Finding> = of_data.cloned().collect();
         reasons.extend(of_data);
-        reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level));
-        let most = reasons.iter().map(|reason| reason.level).max();
+        reasons.sort_by_key(|reason| std::cmp::Reverse(reason.severity));
+        let most = reasons.iter().map(|reason| reason.severity).max();
         let level = VerdictLevel::of(most.unwrap_or_default());
         let assumptions = match level {
             VerdictLevel::Inadequate => Vec::new(),
             _ => verdict_assumptions(problem),
         };
-        let stated = [unknown_mass(self.model), assumed_units(self.model)];
         Verdict {
             level,
-            assumptions: (stated.into_iter().flatten())
-                .chain(assumptions.iter().map(assumption))
+            assumptions: (self.model.assumptions().chain(assumptions))
+                .map(Finding::from)
                 .collect(),
             passed: match reasons.is_empty() {
                 true => self.passed(),
@@ -111,18 +111,16 @@ impl FittedModel<'_> {
             });
             shares.reduce(f64::min)
         };
-        self.model.data.iter().filter_map(move |fact| {
-            let is_input = fact.kind == "quantisation" && fact.said("action")? == "used";
-            let share = fact.number("share").filter(|_| is_input)?;
-            let (experiment, channel) = (fact.said("experiment")?, fact.said("channel")?);
-            let is_input = !problem.channels().any(|c| c.kind().name() == channel);
-            let error_is_stated = (problem.experiments.iter())
-                .any(|e| e.name == experiment && e.input_error.is_some());
-            let is_coarse = is_input && !error_is_stated && share > COARSE * noise(&experiment)?;
-            is_coarse.then_some(Doubt::CoarseInput {
-                experiment,
-                channel,
-            })
+        self.model.doubts().filter_map(move |doubt| match doubt {
+            Doubt::CoarseInput {
+                experiment, share, ..
+            } => {
+                let error_is_stated = (problem.experiments.iter())
+                    .any(|e| e.name == *experiment && e.input_error.is_some());
+                let is_coarse = !error_is_stated && *share > COARSE * noise(experiment)?;
+                is_coarse.then(|| doubt.clone())
+            }
+            _ => None,
         })
     }
 
@@ -270,27 +268,6 @@ fn of_balance(balance: &EquationBalance) -> Option<Doubt> {
 /// True for the ratios among the estimates.
 fn is_ratio(name: &str) -> bool {
     Ratio::named(name).is_some()
-}
-
-/// An assumption of a verdict as a sentence.
-pub fn assumption(assumption: &VerdictAssumption) -> Finding {
-    let text = match assumption {
-        VerdictAssumption::Clock { experiment } => format!(
-            "the clock of {experiment} is right: an error of its rate changes all frequencies by as much"
-        ),
-        VerdictAssumption::Unit {
-            experiment,
-            channel,
-        } => format!(
-            "the units of the {channel} and of the input of {experiment} are right: an error of either changes mass, damping and \
-             stiffness by the same factor"
-        ),
-        VerdictAssumption::Scale { functions } => format!(
-            "the {} fixed by the model is right: no force is measured, and the other coefficients scale with it",
-            and_list(functions)
-        ),
-    };
-    Finding::of(assumption, text)
 }
 
 #[cfg(test)]

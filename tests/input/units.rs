@@ -21,9 +21,9 @@ fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), St
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
     let model = build(&file, BuildMode::Fit).map_err(said)?;
     let grid = &model.problem.system.grid;
-    let about_units = |w: &&Finding| w.kind.contains("unit");
+    let about_units = |w: &&Finding| w.check.contains("unit");
     let warnings: Vec<&str> = (model.warnings.iter().filter(about_units))
-        .map(|w| w.text.as_str())
+        .map(|w| w.sentence.as_str())
         .collect();
     Ok((warnings.join("\n"), grid.time(grid.nodes() - 1)))
 }

@@ -65,6 +65,7 @@ pub mod builder;
 pub mod candidates;
 pub mod constraints;
 pub mod diagnostics;
+pub mod finding;
 pub mod functions;
 pub mod host;
 pub mod identifiability;

@@ -22,12 +22,14 @@ pub use study::StudyPlan;
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
-use kmcfit_core::assessment::Severity;
+use kmcfit_core::assessment::Doubt;
 use kmcfit_core::builder::{BuildError, Builder, Contradiction, listed};
+use kmcfit_core::finding::Severity;
 use kmcfit_core::host::Instant;
 use kmcfit_core::problem::Problem;
 use kmcfit_core::solvers::{FitSettings, Solver, timed};
 use kmcfit_core::system::{Grid, NodalCoefficients, State};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -70,7 +72,7 @@ pub struct Model {
     /// Automatic choices, such as the number of nodes.
     pub automatic: Vec<Finding>,
     /// Units that neither the model nor a file states.
-    pub assumed_units: Vec<Finding>,
+    pub assumed_units: Vec<String>,
     /// True if the model states that the mass is unknown: it is 1, and the other coefficients are ratios to it.
     pub has_unknown_mass: bool,
     /// The automatic grid of a fit, which may be refined; `None` for a stated number of nodes.
@@ -86,19 +88,25 @@ impl Model {
     pub fn is_kept_up(&self) -> bool {
         let mut experiments = self.problem.experiments.iter();
         experiments.all(|experiment| {
-            let is_of = |w: &Finding| w.said("experiment").as_ref() == Some(&experiment.name);
-            let mut warnings = self.warnings.iter();
-            warnings.any(|w| w.kind == "unmeasured_force" && is_of(w))
+            let is_of = |doubt: &Doubt| {
+                matches!(doubt, Doubt::KeptUp { experiment: of, .. } if *of == experiment.name)
+            };
+            self.doubts().any(is_of)
         })
     }
 
-    /// Values that stand for missing samples and are not stated, with the names of the experiments.
-    pub fn missing_codes(&self) -> impl Iterator<Item = (String, &serde_json::Value)> {
-        let found = self
-            .warnings
-            .iter()
-            .filter(|w| w.kind == experiments::MISSING_CODES);
-        found.filter_map(|w| Some((w.said("experiment")?, w.quantities.get("codes")?)))
+    /// What stands beside its results: an unknown mass, and units that are not stated.
+    pub fn assumptions(&self) -> impl Iterator<Item = Doubt> + use<> {
+        let units = self.assumed_units.clone();
+        let mass = self.has_unknown_mass.then_some(Doubt::MassUnknown);
+        let units = (!units.is_empty()).then_some(Doubt::UnitsAssumed { units });
+        mass.into_iter().chain(units)
+    }
+
+    /// The doubts about its data.
+    pub fn doubts(&self) -> impl Iterator<Item = &Doubt> {
+        let all = self.warnings.iter().chain(&self.data);
+        all.filter_map(|finding| finding.doubt.as_ref())
     }
 }
 
@@ -266,7 +274,7 @@ fn build_on(
             (Arc::new(read), Vec::new(), None)
         }
     };
-    let (warnings, data) = (read.warnings.clone(), read.data.clone());
+    let (mut warnings, data) = (read.warnings.clone(), read.data.clone());
     let records = &read.records;
     let delay_limits = experiments::delay_limits(file, records)?;
     let choice = grid::build(file, mode, records, least, &mut automatic)?;
@@ -290,18 +298,18 @@ fn build_on(
     if !matches!(mode, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
-    let is_unit = |warning: &Finding| warning.kind == experiments::UNIT_ASSUMED;
-    let (units, mut warnings): (Vec<_>, Vec<_>) = warnings.into_iter().partition(is_unit);
-    // Each channel reads the column of times.
-    let mut assumed_units = Vec::new();
-    for unit in units {
-        if !assumed_units.contains(&unit) {
-            assumed_units.push(unit);
+    // Assumed units stand beside a result, and are no warnings; each channel reads the column of times.
+    let mut assumed_units = BTreeSet::new();
+    warnings.retain(|warning| match &warning.doubt {
+        Some(Doubt::UnitsAssumed { units }) => {
+            assumed_units.extend(units.iter().cloned());
+            false
         }
-    }
+        _ => true,
+    });
     warnings.extend(built.notices.iter().map(Finding::stated));
     for warning in &mut warnings {
-        warning.level = warning.level.max(Severity::Warning);
+        warning.severity = warning.severity.max(Severity::Warning);
     }
     let validation = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
     let (own, notes): (Vec<_>, Vec<_>) = notes
@@ -340,7 +348,7 @@ fn build_on(
         data,
         delay_limits,
         automatic,
-        assumed_units,
+        assumed_units: assumed_units.into_iter().collect(),
         has_unknown_mass: functions::has_unknown_mass(file),
         grid: automatic_grid,
         source,

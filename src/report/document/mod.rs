@@ -15,8 +15,9 @@ use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::assessment::{
-    ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, Severity, StepCheck,
+    ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, StepCheck,
 };
+use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{ClassificationKind, CovarianceKind, Quantity};
 use kmcfit_core::number_format::number_or_nan;
 use kmcfit_core::solvers::{EquationBalance, Optimality, Status};
@@ -305,12 +306,14 @@ impl ResultDocument {
 
     /// Findings that are no warnings.
     pub(super) fn notes(&self) -> impl Iterator<Item = &Finding> {
-        self.findings.iter().filter(|f| f.level == Severity::Note)
+        self.findings
+            .iter()
+            .filter(|f| f.severity == Severity::Note)
     }
 
     /// Warnings on identifiability and the confidence intervals.
     pub(super) fn fit_warnings(&self) -> impl Iterator<Item = &Finding> {
-        self.findings.iter().filter(|f| f.level > Severity::Note)
+        self.findings.iter().filter(|f| f.severity > Severity::Note)
     }
 
     /// Warnings that are no reasons of the verdict, where they stand with the same sentence.
@@ -319,8 +322,11 @@ impl ResultDocument {
         warnings: impl Iterator<Item = &'a Finding>,
     ) -> Vec<String> {
         let reasons = self.verdict.as_ref().map_or(&[][..], |v| &v.reasons);
-        let is_other = |text: &String| reasons.iter().all(|reason| reason.text != *text);
-        warnings.map(|w| w.text.clone()).filter(is_other).collect()
+        let is_other = |text: &String| reasons.iter().all(|reason| reason.sentence != *text);
+        warnings
+            .map(|w| w.sentence.clone())
+            .filter(is_other)
+            .collect()
     }
 
     /// True where the fit or the data show two modes.

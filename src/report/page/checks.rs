@@ -4,9 +4,10 @@ use super::table::{paragraph, table};
 use crate::number_format::{at_most, significant};
 use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
-use crate::report::doubts;
 use crate::report::text::decade;
-use kmcfit_core::assessment::{BasisComparison, EXACT, Extension, ExtensionTest, ModelTests};
+use kmcfit_core::assessment::{
+    BasisComparison, ClassicalEstimate, EXACT, Extension, ExtensionTest, ModelTests,
+};
 
 /// Step-size check, tests against larger models, and the classical estimates. Empty for a fit without any.
 pub(super) fn checks(document: &ResultDocument) -> String {
@@ -33,7 +34,7 @@ pub(super) fn checks(document: &ResultDocument) -> String {
         text += &bases(tests);
         text += &extensions(document, tests);
     }
-    let classical = document.classical.as_ref().map(doubts::classical);
+    let classical = document.classical.as_ref().map(ClassicalEstimate::sentence);
     text + &classical.map_or(String::new(), |classical| {
         paragraph(&format!("Classical estimate: {classical}."))
     })

@@ -5,13 +5,13 @@ use super::overview::state;
 use super::table::{list, paragraph, table};
 use crate::config::DataFile;
 use crate::finding::Finding;
-use crate::number_format::count;
+use crate::number_format::{and_list, count};
 use crate::report::FittedModel;
 use crate::report::answer::{AnswerRow, answer};
 use crate::report::chart::Figure;
 use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::extent::extent;
-use crate::report::text::{and_list, escape, prose};
+use crate::report::text::{escape, prose};
 use kmcfit_core::assessment::VerdictLevel;
 use std::path::Path;
 

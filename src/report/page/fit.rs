@@ -145,7 +145,7 @@ fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
 /// Findings, assumptions, nuisance parameters, notes on the bands, and the command of a study.
 fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
     let known = &document.identifiability;
-    let notes: Vec<String> = document.notes().map(|f| f.text.clone()).collect();
+    let notes: Vec<String> = document.notes().map(Finding::to_string).collect();
     let warnings = document.other_warnings(document.fit_warnings());
     let mut text = list(&notes) + &list(&warnings);
     text += &match known.assumptions.as_slice() {

@@ -4,8 +4,7 @@ use super::document::*;
 use super::records::{Optimum, finite_numbers};
 use crate::config::Model;
 use crate::number_format::{resolved, significant};
-use crate::report::doubts;
-use kmcfit_core::assessment::Plausibility;
+use kmcfit_core::assessment::{Doubt, Plausibility, Unidentified};
 use kmcfit_core::diagnostics::normal_half_width;
 use kmcfit_core::functions::Ratio;
 use kmcfit_core::identifiability::{
@@ -27,8 +26,8 @@ pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
         false => Vec::new(),
     };
     let mut notes = bands.notes.clone();
-    notes.extend((plausibility.unidentified.iter()).map(|why| doubts::unidentified(why).text));
-    notes.extend((plausibility.warnings.iter()).map(|w| doubts::doubt(w).text));
+    notes.extend((plausibility.unidentified.iter()).map(Unidentified::sentence));
+    notes.extend((plausibility.warnings.iter()).map(Doubt::sentence));
     let records = with_means(&bands).enumerate().map(|(i, (band, mean))| {
         let real = truth.and_then(|truth| match Ratio::named(&band.name) {
             Some(ratio) => Some(ratio.at_nodes(problem.system.laws(), truth)),

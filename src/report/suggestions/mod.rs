@@ -16,6 +16,7 @@ use kmcfit_core::problem::FEW_PARAMETERS;
 use kmcfit_core::solvers::{Solver, StartStrategy, Status};
 use records::{about_disturbance, about_interpolation, about_records};
 use residuals::{about_misfit, about_patterns};
+use serde_json::json;
 use terms::{about_friction, about_terms};
 
 /// Most pieces of advice.
@@ -101,7 +102,10 @@ impl Suggestion {
             text += &format!(" ({outcome})");
             finding = finding.with("tried", outcome);
         }
-        Finding { text, ..finding }
+        Finding {
+            sentence: text,
+            ..finding
+        }
     }
 }
 
@@ -113,7 +117,7 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
         return vec![codes];
     }
     steps.extend(about_ending(document));
-    steps.extend(about_steps(document));
+    steps.extend(about_steps(document, model));
     steps.extend(about_records(document, model));
     steps.extend(about_means(document));
     steps.extend(about_terms(document));
@@ -186,12 +190,17 @@ fn written(value: f64) -> String {
 
 /// Statement of the codes that stand for missing samples.
 fn about_codes(model: &Model) -> Option<Suggestion> {
-    let overrides = model.missing_codes().filter_map(|(name, codes)| {
+    let overrides = model.doubts().filter_map(|doubt| {
+        let Doubt::MissingCodes {
+            experiment, codes, ..
+        } = doubt
+        else {
+            return None;
+        };
         let mut experiments = model.problem.experiments.iter();
-        let i = model
-            .positions
-            .get(experiments.position(|e| e.name == name)?)?;
-        Some(format!("experiments.{i}.missing={codes}"))
+        let i = experiments.position(|e| e.name == *experiment)?;
+        let i = model.positions.get(i)?;
+        Some(format!("experiments.{i}.missing={}", json!(codes)))
     });
     let overrides: Vec<String> = overrides.collect();
     (!overrides.is_empty()).then(|| {
@@ -235,7 +244,7 @@ fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
 }
 
 /// A finer grid where the step-size check fails; an automatic number of nodes where a fit refines it.
-fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
+fn about_steps(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
     let half = document.step_check.as_ref()?;
     let is_exact = document.worst_fit().is_some_and(|worst| worst > EXACT);
     let beside_residuals = match is_exact {
@@ -249,19 +258,18 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
     if is_fast || half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
-    let model = &document.model;
+    let summary = &document.model;
     let refines = [Solver::GaussNewton, Solver::ProjectedGradient];
-    let is_refined = refines.iter().any(|solver| model.method == solver.name());
-    let is_automatic = |f: &Finding| f.kind.starts_with("nodes_from");
-    let is_chosen = document.automatic.iter().any(is_automatic);
+    let is_refined = refines.iter().any(|solver| summary.method == solver.name());
+    let is_chosen = model.grid.is_some();
     // The steps of a chosen grid are not why a model does not fit.
     if is_chosen && document.worst_fit().is_some_and(is_poor) {
         return None;
     }
-    let automatic = is_refined && model.parameters <= FEW_PARAMETERS && !is_chosen;
+    let automatic = is_refined && summary.parameters <= FEW_PARAMETERS && !is_chosen;
     let nodes = match automatic {
         true => "auto".to_owned(),
-        false => (2 * model.nodes - 1).to_string(),
+        false => (2 * summary.nodes - 1).to_string(),
     };
     Some(Suggestion::change(
         "finer_steps",
@@ -327,16 +335,6 @@ fn about_rank(document: &ResultDocument) -> Option<Suggestion> {
     })
 }
 
-/// A percentage; one far below zero in powers of ten.
-pub(super) fn percent(share: f64, digits: usize) -> String {
-    match share > -1000.0 {
-        // Zero has no sign.
-        true if share.abs() < 0.5 * 0.1f64.powi(digits as i32) => format!("{:.digits$} %", 0.0),
-        true => format!("{share:.digits$} %"),
-        false => format!("{share:.0e} %"),
-    }
-}
-
 /// True where the fit leaves residuals that no noise explains.
 pub(super) fn is_unexplained(document: &ResultDocument) -> bool {
     has(document, |doubt| {
@@ -359,13 +357,13 @@ mod tests {
         let change = Suggestion::change("add_term", "add the missing term", overrides.clone());
         let finding = change.finding(Some("tried: Adequate"));
         assert_eq!(
-            finding.text,
+            finding.sentence,
             "add the missing term: `--set 'functions.cubic_stiffness={start: 1.0}'` (tried: Adequate)"
         );
         assert_eq!(finding.quantities["set"], serde_json::json!(overrides));
         assert_eq!(finding.quantities["tried"], "tried: Adequate");
         let outside = Suggestion::outside("noise_limited", "noise limits the fit").finding(None);
-        assert_eq!(outside.text, "noise limits the fit");
+        assert_eq!(outside.sentence, "noise limits the fit");
         assert!(outside.quantities.is_empty());
     }
 

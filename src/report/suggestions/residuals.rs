@@ -1,8 +1,8 @@
 //! Suggestions from the size and the patterns of the residuals.
 
-use super::{Suggestion, is_poor, of_channel, percent};
+use super::{Suggestion, is_poor, of_channel};
 use crate::config::Model;
-use crate::number_format::{significant, times_in_words};
+use crate::number_format::{percent, significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use kmcfit_core::assessment::{BEYOND_SIGMA, Doubt, EXACT, POOR, ResidualPattern};
 use kmcfit_core::diagnostics::SIGNIFICANCE;

@@ -13,6 +13,7 @@
 use crate::diagnostics::{NORMAL_975, student_half_width};
 use crate::functions::Ratio;
 use crate::identifiability::{Bands, Quantity};
+use crate::number_format::resolved;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Waveform};
@@ -62,6 +63,35 @@ pub struct ClassicalEstimate {
     pub damping_interval: Option<[f64; 2]>,
     /// True if both intervals overlap those of the fit.
     pub agrees: bool,
+}
+
+impl ClassicalEstimate {
+    /// The estimate beside that of the fit, as a clause.
+    pub fn sentence(&self) -> String {
+        let [names, of_damping] = match self.method {
+            ClassicalMethod::LogarithmicDecrement => {
+                ["extremes of the decay", "logarithmic decrement"]
+            }
+            ClassicalMethod::FrequencyResponse => ["FRF peak", "half-power width"],
+        };
+        let number = |value: f64, [low, high]: [f64; 2]| {
+            let [value, ..] = resolved([value, low, high], 0.5 * (high - low));
+            value
+        };
+        let damping = self.damping_ratio.zip(self.damping_interval);
+        let damping = damping.map(|(value, interval)| {
+            format!(", damping ratio {} ({of_damping})", number(value, interval))
+        });
+        format!(
+            "{names} {} Hz{}: {}",
+            number(self.frequency, self.frequency_interval),
+            damping.unwrap_or_default(),
+            match self.agrees {
+                true => "agree with the estimates",
+                false => "disagree with the estimates beyond both intervals",
+            }
+        )
+    }
 }
 
 /// Classical estimate from the first channel of the first experiment that allows one, for a linear model; of a forced response with constant

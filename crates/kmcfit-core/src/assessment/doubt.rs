@@ -5,11 +5,12 @@ use super::implausible::Implausible;
 use super::record_error::RecordError;
 use super::refinement::CoarseBasis;
 use super::rivals::AmplitudeRival;
+use crate::finding::Severity;
 use crate::record::ScoreCovariance;
 use crate::solvers::{MissingTerm, Status};
 use crate::step::SimulationError;
 use crate::system::InputQuantity;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// A doubt about a fit: one test that it did not pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -185,6 +186,35 @@ pub enum Doubt {
         experiment: String,
         /// Name of the channel.
         channel: String,
+        /// Standard deviation of the error relative to that of the samples.
+        #[serde(skip)]
+        share: f64,
+    },
+    /// Values that stand for missing samples, and are not stated as such.
+    MissingCodes {
+        /// Name of the experiment.
+        #[serde(skip)]
+        experiment: String,
+        /// Kinds of the channels.
+        channels: Vec<String>,
+        /// The values, in the unit of the file.
+        codes: Vec<f64>,
+    },
+    /// Samples of a channel are far from the others: outliers or spikes.
+    Outliers {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the channel.
+        channel: String,
+    },
+    /// A record without an input does not decay: an unmeasured force keeps it up.
+    #[serde(rename = "unmeasured_force")]
+    KeptUp {
+        /// Name of the experiment.
+        #[serde(skip)]
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
     },
     /// An estimated delay beyond its limits.
     DelayAtLimit {
@@ -228,6 +258,30 @@ pub enum Doubt {
         /// The parts.
         not_done: Vec<&'static str>,
     },
+    /// The mass is unknown: the other coefficients are ratios to it.
+    MassUnknown,
+    /// Units that neither the model nor a file states.
+    UnitsAssumed {
+        /// Quantities with the units: `force in N`.
+        units: Vec<String>,
+    },
+    /// The clock of a record, on which all its columns are, cannot be tested.
+    Clock {
+        /// Name of the experiment.
+        experiment: String,
+    },
+    /// The unit of the only channel of a record with an input cannot be tested.
+    Unit {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+    },
+    /// The values of the fixed functions that determine the scale of mass, damping and stiffness, which the samples leave open.
+    Scale {
+        /// Names of the functions.
+        functions: Vec<String>,
+    },
     /// An error of a record explains the residuals.
     #[serde(untagged)]
     RecordError(RecordError),
@@ -253,21 +307,6 @@ pub enum Unidentified {
     Noise,
 }
 
-/// What a finding means for the use of the estimates.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Severity {
-    /// What is determined, or how.
-    #[default]
-    Note,
-    /// What is to be known, and limits no estimate beyond its interval.
-    Warning,
-    /// It limits the estimates, or an engineer must decide whether it does: a reason of the verdict.
-    Check,
-    /// The estimates are not those of the system: a reason of the verdict.
-    Inadequate,
-}
-
 impl Doubt {
     /// What it means for the estimates.
     pub fn severity(&self) -> Severity {
@@ -278,7 +317,12 @@ impl Doubt {
             | Self::BeyondSigma { .. }
             | Self::CoarseSteps { .. }
             | Self::RecordError(RecordError::InputSign { .. }) => Severity::Inadequate,
-            Self::Correlated => Severity::Warning,
+            Self::Correlated | Self::KeptUp { .. } => Severity::Warning,
+            Self::MassUnknown
+            | Self::UnitsAssumed { .. }
+            | Self::Clock { .. }
+            | Self::Unit { .. }
+            | Self::Scale { .. } => Severity::Note,
             _ => Severity::Check,
         }
     }

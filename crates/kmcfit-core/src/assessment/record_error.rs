@@ -1,5 +1,6 @@
 //! Errors of a record that no parameter of the model explains.
 
+use crate::number_format::{count, significant};
 use crate::system::InputQuantity;
 use serde::Serialize;
 
@@ -61,4 +62,70 @@ pub enum RecordError {
         /// True if other channels of the record agree with the model without it.
         beside_others: bool,
     },
+}
+
+impl RecordError {
+    /// The error as a clause.
+    pub fn sentence(&self) -> String {
+        match self {
+            Self::Delay {
+                experiment,
+                delay,
+                samples,
+            } => format!(
+                "the response of {experiment} {} its input by {} s ({} samples)",
+                if *delay > 0.0 { "lags" } else { "leads" },
+                significant(delay.abs(), 3),
+                significant(samples.abs(), 3)
+            ),
+            Self::ClockDifference {
+                experiment,
+                percent,
+            } => format!(
+                "the clocks of input and response of {experiment} differ: the times of the response are {} % too {}",
+                significant(percent.abs(), 3),
+                if *percent > 0.0 { "short" } else { "long" }
+            ),
+            Self::InputPulses {
+                experiment,
+                count: pulses,
+                time,
+                error,
+            } => format!(
+                "the force of {experiment} has errors at {}, as by spikes, cut peaks or unmeasured impacts, the largest of about {} N near {} s",
+                count(*pulses, "sample"),
+                significant(*error, 2),
+                significant(*time, 6)
+            ),
+            Self::InputJump {
+                experiment,
+                input,
+                between: [from, to],
+                jump,
+            } => format!(
+                "the {} of {experiment} jumps by {} {} between its samples at {} and {} s, and its interpolation does not have the time of the jump",
+                input.name().replace('_', " "),
+                significant(*jump, 3),
+                input.unit(),
+                significant(*from, 6),
+                significant(*to, 6)
+            ),
+            Self::InputSign { experiment } => {
+                format!("the input of {experiment} has the wrong sign")
+            }
+            Self::ChannelFactor {
+                experiment,
+                channel,
+                factor,
+                beside_others,
+            } => format!(
+                "the {channel} of {experiment} is {} times {}",
+                significant(*factor, 4),
+                match beside_others {
+                    true => "what its other channels and the model give",
+                    false => "what its input and the model give",
+                }
+            ),
+        }
+    }
 }

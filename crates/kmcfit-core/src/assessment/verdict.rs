@@ -4,7 +4,8 @@
 //! noise model, the time steps, the bases, missing force terms, the inputs, and what the samples identify.
 
 use super::FitAssessment;
-use super::doubt::{Doubt, Severity, Unidentified};
+use super::{Doubt, Unidentified};
+use crate::finding::Severity;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
 };
@@ -30,7 +31,7 @@ impl VerdictLevel {
     /// Level of a verdict whose findings are of at most this severity.
     pub fn of(most: Severity) -> Self {
         match most {
-            Severity::Note | Severity::Warning => Self::Adequate,
+            Severity::Detail | Severity::Note | Severity::Warning => Self::Adequate,
             Severity::Check => Self::Check,
             Severity::Inadequate => Self::Inadequate,
         }

@@ -5,6 +5,7 @@ use super::coefficient_sets::FunctionEntry;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
 use crate::constraints::{Constraint, ConstraintError, Constraints, Shape, TOLERANCE, TimeHistory};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
+use crate::number_format::and_list;
 use crate::problem::Problem;
 use crate::solvers::StartProjection;
 
@@ -320,10 +321,5 @@ fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError
 
 /// Enumeration of names: `a`, `a and b`, `a, b and c`.
 pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
-    let names: Vec<&str> = names.into_iter().collect();
-    match names.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        Some((last, _)) => (*last).to_owned(),
-        None => String::new(),
-    }
+    and_list(&names.into_iter().collect::<Vec<_>>())
 }

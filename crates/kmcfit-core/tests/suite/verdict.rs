@@ -3,8 +3,7 @@
 
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::assessment::{
-    Doubt, EstimateStatus, FitAssessment, VerdictAssumption, estimates, verdict_assumptions,
-    verdict_reasons,
+    Doubt, EstimateStatus, FitAssessment, estimates, verdict_assumptions, verdict_reasons,
 };
 use kmcfit_core::builder::{Builder, Record};
 use kmcfit_core::model::CoefficientSpec;
@@ -221,10 +220,10 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
     // A stated value is an assumption of the verdict, no reason.
     assert_eq!(reasons, []);
     let functions = vec!["mass".to_owned()];
-    assert!(assumptions.contains(&VerdictAssumption::Scale { functions }));
+    assert!(assumptions.contains(&Doubt::Scale { functions }));
     let (weighed, reasons, assumptions) = with(CoefficientSpec::uncertain(2.0, 0.01));
     assert_eq!(status(&weighed, "stiffness"), EstimateStatus::Estimated);
     assert_eq!(reasons, []);
-    let is_scale = |a: &VerdictAssumption| matches!(a, VerdictAssumption::Scale { .. });
+    let is_scale = |a: &Doubt| matches!(a, Doubt::Scale { .. });
     assert!(!assumptions.iter().any(is_scale));
 }

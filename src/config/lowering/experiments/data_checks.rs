@@ -7,8 +7,9 @@ use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::number_format::significant;
 use crate::tables::codes_of_column;
-use kmcfit_core::assessment::{Doubt, Severity};
+use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::{detrended, outlier_indices, standard_deviation};
+use kmcfit_core::finding::Severity;
 use kmcfit_core::model::{ExperimentSpec, InitialSpec, KnownValue, ScalarSpec};
 use kmcfit_core::record::{ChannelKind, Loss};
 use kmcfit_core::signal::{
@@ -54,9 +55,6 @@ const OPPOSITE: f64 = 0.7;
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
-/// Kind of the warning about codes for missing samples.
-pub const MISSING_CODES: &str = "missing_codes";
-
 /// Warnings about the record of an experiment.
 pub fn of(entry: &Entry<'_>, record: &RawRecord) -> Vec<Finding> {
     let (file, spec) = (entry.at.file, entry.spec);
@@ -69,16 +67,16 @@ pub fn of(entry: &Entry<'_>, record: &RawRecord) -> Vec<Finding> {
         warnings
     };
     let of_motion = || {
-        let mut warnings: Vec<Finding> = missing_codes(record).into_iter().collect();
+        let mut warnings: Vec<Finding> = missing_codes(entry, record).into_iter().collect();
         if warnings.is_empty() {
-            let outliers = record.channels.iter().filter_map(|c| outliers(spec, c));
+            let outliers = record.channels.iter().filter_map(|c| outliers(entry, c));
             warnings.extend(outliers);
         }
         // The equation error simulates no response from an initial state.
         if !is_equation_error(file) {
             warnings.extend(rest_before_motion(spec, record));
         }
-        warnings.extend(unmeasured_force(spec, record));
+        warnings.extend(unmeasured_force(entry, record));
         warnings.extend(modes(entry, record));
         warnings.extend(excluded_frequency(file, record));
         warnings
@@ -335,20 +333,19 @@ fn correlation_with_estimate(
 }
 
 /// A record without an input that a random force keeps up.
-fn unmeasured_force(spec: &ExperimentSpec, record: &RawRecord) -> Option<Finding> {
+fn unmeasured_force(entry: &Entry<'_>, record: &RawRecord) -> Option<Finding> {
     let mut channels = record.channels.iter();
     let is_affected = |c: &&RawChannel| c.spacing.is_some_and(|s| is_kept_up(&c.values, s));
-    let found = channels.find(|c| !has_input(spec, record) && is_affected(c))?;
-    let channel = found.kind.name();
-    let text = format!(
-        "no force is measured, and the {channel} does not decay: an unmeasured force acts, with which neither a free response nor the \
-         equation error determines the damping; `fit: {{method: equation-error}}` gives the natural frequency"
-    );
-    Some(Finding::new("unmeasured_force", text).with("channel", channel))
+    let found = channels.find(|c| !has_input(entry.spec, record) && is_affected(c))?;
+    let doubt = Doubt::KeptUp {
+        experiment: entry.name(),
+        channel: found.kind.name().to_owned(),
+    };
+    Some(doubt.into())
 }
 
 /// Codes for missing samples, which no statement of the model takes as such.
-fn missing_codes(record: &RawRecord) -> Option<Finding> {
+fn missing_codes(entry: &Entry<'_>, record: &RawRecord) -> Option<Finding> {
     let (mut channels, mut codes): (Vec<String>, Vec<f64>) = Default::default();
     for channel in record.channels.iter().filter(|c| c.loss == Loss::Squares) {
         // Digits of the file, without the rounding of the conversion to SI.
@@ -364,15 +361,13 @@ fn missing_codes(record: &RawRecord) -> Option<Finding> {
     }
     codes.sort_by(f64::total_cmp);
     codes.dedup();
-    let all = codes.iter().map(|code| format!("{code:?}"));
-    let text = format!(
-        "the {} holds the value {} far outside the others, which stands for a missing sample: `missing: {}`",
-        channels.join(" and the "),
-        all.collect::<Vec<_>>().join(" and "),
-        json!(codes)
-    );
-    let found = json!({"channels": channels, "codes": codes});
-    (!codes.is_empty()).then(|| Finding::having(MISSING_CODES, text, found).rated(Severity::Check))
+    (!codes.is_empty()).then(|| {
+        Finding::from(Doubt::MissingCodes {
+            experiment: entry.name(),
+            channels,
+            codes,
+        })
+    })
 }
 
 /// A free record, or one with a measured force, in which two modes vibrate.
@@ -396,7 +391,7 @@ fn modes(entry: &Entry<'_>, record: &RawRecord) -> Option<Finding> {
         significant(second, 3)
     );
     let found = json!({"channel": channel, "frequencies": frequencies});
-    let finding = Finding::having("two_modes", text, found).rated(Severity::Check);
+    let finding = Finding::having("two_modes", text, found);
     Some(finding.about(Doubt::SecondMode {
         experiment: entry.name(),
         frequencies,
@@ -430,7 +425,7 @@ fn in_file(spec: &ExperimentSpec, channel: &RawChannel, sample: usize) -> f64 {
 }
 
 /// Outliers of a channel with a quadratic loss.
-fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<Finding> {
+fn outliers(entry: &Entry<'_>, channel: &RawChannel) -> Option<Finding> {
     if channel.loss != Loss::Squares {
         return None;
     }
@@ -440,7 +435,7 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<Finding> {
     let first = *far.first()?;
     let (kind, samples, unit) = (channel.kind.name(), far.len(), channel.unit.symbol());
     let value = channel.values[first] / channel.unit.factor();
-    let time = in_file(spec, channel, first);
+    let time = in_file(entry.spec, channel, first);
     let [end, them] = if samples == 1 {
         ["", "it"]
     } else {
@@ -462,5 +457,10 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<Finding> {
         "first_time": time,
         "unit": unit
     });
-    Some(Finding::having("outliers", text, found).rated(Severity::Check))
+    let doubt = Doubt::Outliers {
+        experiment: entry.name(),
+        channel: kind.to_owned(),
+    };
+    let finding = Finding::having("outliers", text, found);
+    Some(finding.about(doubt))
 }

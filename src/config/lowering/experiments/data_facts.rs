@@ -5,6 +5,7 @@ use crate::error::InputError;
 use crate::finding::Finding;
 use crate::number_format::{count as counted, significant};
 use crate::tables::{Table, TableFormat};
+use kmcfit_core::finding::Severity;
 use serde::Serialize;
 use serde_json::Value;
 use std::rc::Rc;
@@ -55,8 +56,8 @@ impl RecordNotes {
 
     /// Adds a fact, unless another channel of the same file has stated it.
     pub fn state(&mut self, experiment: &str, fact: Finding) {
-        let text = format!("{experiment}: {}", fact.text);
-        let fact = Finding { text, ..fact }.with("experiment", experiment);
+        let sentence = format!("{experiment}: {}", fact.sentence);
+        let fact = Finding { sentence, ..fact }.with("experiment", experiment);
         if !self.data.contains(&fact) {
             self.data.push(fact);
         }
@@ -85,7 +86,12 @@ pub const LEAST_SIGMA: Action = (
 /// A fact about the data of one experiment, and what was done. Times are those of the file, s; values are in the unit of the column.
 pub fn fact(kind: &str, text: &str, action: Action, quantities: Value) -> Finding {
     let (name, words) = action;
-    Finding::having(kind, format!("{text}: {words}"), quantities).with("action", name)
+    let fact = Finding::having(kind, format!("{text}: {words}"), quantities).with("action", name);
+    let severity = match action == USED {
+        true => Severity::Detail,
+        false => Severity::Note,
+    };
+    Finding { severity, ..fact }
 }
 
 /// A gap in the times of a channel.

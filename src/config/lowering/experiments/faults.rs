@@ -9,8 +9,9 @@ use super::data_facts::{
 use crate::finding::Finding;
 use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
-use kmcfit_core::assessment::{Doubt, Severity};
+use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::finding::Severity;
 use kmcfit_core::model::FaultName;
 use kmcfit_core::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::system::round_time;
@@ -90,7 +91,15 @@ impl Column<'_> {
         );
         // The share is the standard deviation of the error, step/sqrt(12), relative to that of the samples.
         let found = json!({"channel": channel, "step": step, "unit": unit, "share": share});
-        let fact = fact("quantisation", &text, action, found);
+        let fact = Finding {
+            severity: Severity::Detail,
+            doubt: (self.is_input && action == USED).then(|| Doubt::CoarseInput {
+                experiment: self.entry.name(),
+                channel: channel.to_owned(),
+                share,
+            }),
+            ..fact("quantisation", &text, action, found)
+        };
         notes.state(&self.entry.name(), fact);
     }
 
@@ -262,11 +271,14 @@ impl Column<'_> {
         let warning = Finding::having(kind, warning, of_warning)
             .rated(Severity::Check)
             .with("samples", count);
+        let of = channel.to_owned();
         let warning = match fault {
-            FaultName::Saturation => warning.about(Doubt::Saturation {
-                channel: channel.to_owned(),
+            FaultName::Saturation => warning.about(Doubt::Saturation { channel: of }),
+            FaultName::Spikes => warning.about(Doubt::Outliers {
+                experiment: self.entry.name(),
+                channel: of,
             }),
-            FaultName::Dropouts | FaultName::Spikes => warning,
+            FaultName::Dropouts => warning,
         };
         [fact, warning].map(|finding| finding.with("channel", channel))
     }

@@ -31,9 +31,7 @@ use kmcfit_core::signal::Signal;
 use kmcfit_core::system::{Grid, InputQuantity};
 use std::sync::Arc;
 
-pub(super) use data_checks::MISSING_CODES;
 pub(super) use excitation::shape;
-pub(super) use unit::UNIT_ASSUMED;
 
 /// Data of one experiment before it is placed on the grid, at the times of its samples.
 #[derive(Debug, Clone)]
@@ -241,11 +239,8 @@ fn read_one(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<RawRecord, Inp
     }
     let checks = data_checks::of(entry, &record);
     // Outliers are spikes as well.
-    notes.warnings.retain(|spikes| {
-        let is_of = |w: &Finding, key: &str| w.quantities.get(key) == spikes.quantities.get(key);
-        let mut outliers = checks.iter().filter(|w| w.kind == "outliers");
-        spikes.kind != "spikes" || !outliers.any(|w| is_of(w, "experiment") && is_of(w, "channel"))
-    });
+    let is_repeated = |w: &Finding| w.doubt.is_some() && checks.iter().any(|c| c.doubt == w.doubt);
+    notes.warnings.retain(|warning| !is_repeated(warning));
     notes.warnings.extend(checks);
     delays::apply(entry, &mut record, notes)?;
     Ok(record)

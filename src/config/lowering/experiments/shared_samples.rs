@@ -4,7 +4,7 @@ use super::{Entry, RawChannel, RawRecord};
 use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::finding::Finding;
-use kmcfit_core::assessment::Severity;
+use kmcfit_core::finding::Severity;
 use kmcfit_core::model::ColumnRef;
 
 /// Refuses an experiment with the same column in two places.

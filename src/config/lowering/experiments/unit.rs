@@ -5,11 +5,9 @@ use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
 use crate::units::{Measurand, ScaledUnit, Unit};
-use kmcfit_core::assessment::Severity;
+use kmcfit_core::assessment::Doubt;
+use kmcfit_core::finding::Severity;
 use serde_json::json;
-
-/// Kind of the statement of a unit that neither the model nor the file states; it stands beside a result, and is no warning.
-pub const UNIT_ASSUMED: &str = "unit_assumed";
 
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
@@ -150,19 +148,15 @@ impl QuantityColumn<'_> {
                 let found = json!({"column": column, "name": name, "used": used, "stated": stated});
                 ("unit_of_name_unused", text, found)
             }
-            (None, None) => (
-                UNIT_ASSUMED,
-                format!("{} in {used} (column `{column}`)", name.replace('_', " ")),
-                json!({"column": column, "quantity": name, "unit": used}),
-            ),
-        };
-        let severity = match warning {
-            UNIT_ASSUMED => Severity::Note,
-            _ => Severity::Check,
+            (None, None) => {
+                let units = vec![format!("{} in {used}", name.replace('_', " "))];
+                warnings.push(Doubt::UnitsAssumed { units }.into());
+                return Ok(si);
+            }
         };
         warnings.push(
             Finding::having(warning, text, found)
-                .rated(severity)
+                .rated(Severity::Check)
                 .at(&columns_key),
         );
         Ok(si)

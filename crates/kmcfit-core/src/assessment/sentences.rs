@@ -1,56 +1,56 @@
 //! Doubts about a fit in words, each a clause that stands alone.
 
-use super::suggestions::percent;
-use super::text::and_list;
-use crate::finding::Finding;
-use crate::number_format::{count, resolved, significant, times_in_words};
-use kmcfit_core::assessment::{
-    ClassicalEstimate, ClassicalMethod, CoarseBasis, Doubt, Implausible, RecordError, Unidentified,
-};
-use kmcfit_core::identifiability::span_words;
-use kmcfit_core::record::ScoreCovariance;
+use super::{AmplitudeRival, CoarseBasis, Doubt, Implausible, Unidentified};
+use crate::number_format::{and_list, percent, significant, times_in_words};
+use crate::record::ScoreCovariance;
+use crate::spans::span_words;
+use serde_json::json;
 
-/// A doubt about a fit as a clause.
-pub fn doubt(doubt: &Doubt) -> Finding {
-    let text = match doubt {
-        Doubt::BeyondSigma { times } => format!(
+/// Difference of BIC beyond which the rival is favoured.
+const FAVOURED: f64 = -10.0;
+
+impl Doubt {
+    /// The doubt as a clause.
+    pub fn sentence(&self) -> String {
+        match self {
+        Self::BeyondSigma { times } => format!(
             "the residuals are {} times sigma: the model does not explain the record, or sigma is too small",
             times_in_words(*times)
         ),
-        Doubt::CoarseSteps { times } => format!(
+        Self::CoarseSteps { times } => format!(
             "the error of the time steps is {} times the residuals",
             times_in_words(*times)
         ),
-        Doubt::PoorFit { fit_percent } => format!(
+        Self::PoorFit { fit_percent } => format!(
             "fit {}: the residuals are large and autocorrelated",
             percent(*fit_percent, 0)
         ),
-        Doubt::Coloured {
+        Self::Coloured {
             covariance: ScoreCovariance::Model,
         } => {
             "the residuals are autocorrelated beyond the noise model: the true confidence intervals are wider".to_owned()
         }
-        Doubt::Coloured {
+        Self::Coloured {
             covariance: ScoreCovariance::Kernel,
         } => {
             "the residuals are autocorrelated beyond the noise model; the confidence intervals are heteroscedasticity- and \
              autocorrelation-consistent"
                 .to_owned()
         }
-        Doubt::Correlated => {
+        Self::Correlated => {
             "the residuals are autocorrelated: the confidence intervals assume correlated noise; a term missing from the model \
              leaves such residuals too"
                 .to_owned()
         }
-        Doubt::Aliased {
+        Self::Aliased {
             per_period,
             frequency,
         } => format!(
             "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz other frequencies fit equally well; sample faster or at \
              unequal intervals"
         ),
-        Doubt::CoarseBasis(basis) => coarse_basis(basis),
-        Doubt::FastVariation {
+        Self::CoarseBasis(basis) => coarse_basis(basis),
+        Self::FastVariation {
             functions,
             per_period,
         } => format!(
@@ -58,14 +58,14 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             and_list(functions),
             significant(*per_period, 2)
         ),
-        Doubt::Oscillates {
+        Self::Oscillates {
             function,
             frequency,
         } => format!(
             "the {function} oscillates at {} Hz, as a second mode that beats with the first makes it",
             significant(*frequency, 2)
         ),
-        Doubt::InterpolationLoss {
+        Self::InterpolationLoss {
             input,
             share,
             errors,
@@ -76,7 +76,7 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             percent(100.0 * share, 2),
             significant(*errors, 2)
         ),
-        Doubt::DisturbedInput {
+        Self::DisturbedInput {
             experiment,
             input,
             share,
@@ -87,7 +87,7 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             input.name().replace('_', " "),
             percent(100.0 * share, 1)
         ),
-        Doubt::CoherentResiduals {
+        Self::CoherentResiduals {
             channel,
             input,
             share,
@@ -97,7 +97,7 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             percent(100.0 * share, 0),
             input.name().replace('_', " ")
         ),
-        Doubt::ContradictedInputSigma {
+        Self::ContradictedInputSigma {
             experiment,
             input,
             given,
@@ -109,7 +109,7 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             significant(*likely, 3),
             input.unit()
         ),
-        Doubt::MissingTerm(missing) => format!(
+        Self::MissingTerm(missing) => format!(
             "the residuals show {} that the model does not have, of {} {} (t = {}, {} of the largest term): the estimates are biased by it",
             missing.term.row().words,
             significant(missing.value, 3),
@@ -117,8 +117,8 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             significant(missing.t, 2),
             percent(100.0 * missing.share, 1),
         ),
-        Doubt::TimeOrAmplitude(rival) => super::rivals::rival_in_words(rival),
-        Doubt::SecondMode {
+        Self::TimeOrAmplitude(rival) => rival_in_words(rival),
+        Self::SecondMode {
             frequencies: [first, second],
             ..
         } => format!(
@@ -126,9 +126,9 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             significant(*second, 3),
             significant(*first, 3)
         ),
-        Doubt::RecordError(error) => record_error(error),
-        Doubt::ClassicalDisagrees(estimate) => classical(estimate),
-        Doubt::ResidualMean {
+        Self::RecordError(error) => error.sentence(),
+        Self::ClassicalDisagrees(estimate) => estimate.sentence(),
+        Self::ResidualMean {
             experiment,
             channel,
             t,
@@ -141,7 +141,7 @@ pub fn doubt(doubt: &Doubt) -> Finding {
             significant(*t, 2),
             if *or_static_force { " or a static force" } else { "" }
         ),
-        Doubt::FrictionWidth {
+        Self::FrictionWidth {
             estimate,
             shift,
             unit,
@@ -159,69 +159,109 @@ pub fn doubt(doubt: &Doubt) -> Finding {
                 significant(*width, 3)
             )
         }
-        Doubt::FrictionWidth { width, better, .. } => format!(
+        Self::FrictionWidth { width, better, .. } => format!(
             "a larger width of Coulomb friction than {} m/s fits better: about {} m/s",
             significant(*width, 3),
             significant(*better, 2)
         ),
-        Doubt::Negative { function } => {
+        Self::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }
-        Doubt::NegligibleForce { experiment } => format!(
+        Self::NegligibleForce { experiment } => format!(
             "the force of {experiment} is negligible beside the inertia force; check its unit"
         ),
-        Doubt::Failed { status } => format!("the fit ended {}", status.name()),
-        Doubt::NoSystem { reason } => unidentified(reason).text,
-        Doubt::NotConverged { status } => {
+        Self::Failed { status } => format!("the fit ended {}", status.name()),
+        Self::NoSystem { reason } => reason.sentence(),
+        Self::NotConverged { status } => {
             format!("the fit ended before it converged ({})", status.name())
         }
-        Doubt::Saturation { channel } => {
-            format!("the {channel} saturates: many samples equal the largest one")
+        Self::MissingCodes {
+            channels, codes, ..
+        } => {
+            let all: Vec<String> = codes.iter().map(|code| format!("{code:?}")).collect();
+            format!(
+                "the {} holds the value {} far outside the others, which stands for a missing sample: `missing: {}`",
+                channels.join(" and the "),
+                all.join(" and "),
+                json!(codes)
+            )
         }
-        Doubt::CoarseInput {
+        Self::Outliers { experiment, channel } => {
+            format!("the {channel} of {experiment} has samples far from the others")
+        }
+        Self::KeptUp { channel, .. } => format!(
+            "no force is measured, and the {channel} does not decay: an unmeasured force acts, with which neither a free response nor the \
+             equation error determines the damping; `fit: {{method: equation-error}}` gives the natural frequency"
+        ),
+        Self::MassUnknown => {
+            "the mass is unknown: all coefficients are ratios to it; `--set functions.mass.fixed=4.5` (kg) states it".to_owned()
+        }
+        Self::UnitsAssumed { units } => format!(
+            "{}: assumed, the file does not state it; `units` in the model file does",
+            and_list(units)
+        ),
+        Self::Clock { experiment } => format!(
+            "the clock of {experiment} is right: an error of its rate changes all frequencies by as much"
+        ),
+        Self::Unit {
             experiment,
             channel,
         } => format!(
+            "the units of the {channel} and of the input of {experiment} are right: an error of either changes mass, damping and \
+             stiffness by the same factor"
+        ),
+        Self::Scale { functions } => format!(
+            "the {} fixed by the model is right: no force is measured, and the other coefficients scale with it",
+            and_list(functions)
+        ),
+        Self::Saturation { channel } => {
+            format!("the {channel} saturates: many samples equal the largest one")
+        }
+        Self::CoarseInput {
+            experiment,
+            channel,
+            ..
+        } => format!(
             "the quantisation error of the {channel} of {experiment} is not small beside the residuals"
         ),
-        Doubt::DelayAtLimit { parameter } => {
+        Self::DelayAtLimit { parameter } => {
             format!("the {parameter} is beyond its limits")
         }
-        Doubt::NotPredicted {
+        Self::NotPredicted {
             experiment,
             fit_percent,
         } => format!(
             "validation record {experiment} is not predicted (fit {})",
             percent(*fit_percent, 0)
         ),
-        Doubt::NotIdentified { functions } => format!(
+        Self::NotIdentified { functions } => format!(
             "the samples do not identify {} at all times",
             and_list(functions)
         ),
-        Doubt::RankDeficient {
+        Self::RankDeficient {
             rank_bound,
             parameters,
         } => {
             format!("at most {rank_bound} of {parameters} parameter combinations are identifiable")
         }
-        Doubt::OnlyRatios => {
+        Self::OnlyRatios => {
             "no force is measured: the samples determine ratios to the mass only".to_owned()
         }
-        Doubt::UnmeasuredForce => {
+        Self::UnmeasuredForce => {
             "no force is measured and an unknown one acts: the damping is not identifiable from this record by this method".to_owned()
         }
-        Doubt::Stopped { not_done } => {
+        Self::Stopped { not_done } => {
             format!("stopped; not done: {}", not_done.join(", "))
         }
-        Doubt::EquationError => {
+        Self::EquationError => {
             "the equation error neglects the noise of the response, which biases the estimates"
                 .to_owned()
         }
-        Doubt::EquationResidual { share } => format!(
+        Self::EquationResidual { share } => format!(
             "the residual of the equation of motion is {} of its largest force",
             percent(100.0 * share, 0)
         ),
-        Doubt::ImplausibleUnits(implausible) => {
+        Self::ImplausibleUnits(implausible) => {
             let (quantity, value, unit) = match implausible {
                 Implausible::NaturalFrequency { value } => ("natural frequency", value, "Hz"),
                 Implausible::Velocity { value } => ("largest velocity", value, "m/s"),
@@ -232,97 +272,7 @@ pub fn doubt(doubt: &Doubt) -> Finding {
                 significant(*value, 2)
             )
         }
-    };
-    let finding = Finding::of(doubt, text).rated(doubt.severity());
-    finding.about(doubt.clone())
-}
-
-/// A classical estimate beside that of the fit, as a clause.
-pub fn classical(estimate: &ClassicalEstimate) -> String {
-    let [names, of_damping] = match estimate.method {
-        ClassicalMethod::LogarithmicDecrement => ["extremes of the decay", "logarithmic decrement"],
-        ClassicalMethod::FrequencyResponse => ["FRF peak", "half-power width"],
-    };
-    let number = |value: f64, [low, high]: [f64; 2]| {
-        let [value, ..] = resolved([value, low, high], 0.5 * (high - low));
-        value
-    };
-    let damping = estimate.damping_ratio.zip(estimate.damping_interval);
-    let damping = damping.map(|(value, interval)| {
-        format!(", damping ratio {} ({of_damping})", number(value, interval))
-    });
-    format!(
-        "{names} {} Hz{}: {}",
-        number(estimate.frequency, estimate.frequency_interval),
-        damping.unwrap_or_default(),
-        match estimate.agrees {
-            true => "agree with the estimates",
-            false => "disagree with the estimates beyond both intervals",
-        }
-    )
-}
-
-/// An error of a record that explains the residuals, as a clause.
-pub fn record_error(error: &RecordError) -> String {
-    match error {
-        RecordError::Delay {
-            experiment,
-            delay,
-            samples,
-        } => format!(
-            "the response of {experiment} {} its input by {} s ({} samples)",
-            if *delay > 0.0 { "lags" } else { "leads" },
-            significant(delay.abs(), 3),
-            significant(samples.abs(), 3)
-        ),
-        RecordError::ClockDifference {
-            experiment,
-            percent,
-        } => format!(
-            "the clocks of input and response of {experiment} differ: the times of the response are {} % too {}",
-            significant(percent.abs(), 3),
-            if *percent > 0.0 { "short" } else { "long" }
-        ),
-        RecordError::InputPulses {
-            experiment,
-            count: pulses,
-            time,
-            error,
-        } => format!(
-            "the force of {experiment} has errors at {}, as by spikes, cut peaks or unmeasured impacts, the largest of about {} N near {} s",
-            count(*pulses, "sample"),
-            significant(*error, 2),
-            significant(*time, 6)
-        ),
-        RecordError::InputJump {
-            experiment,
-            input,
-            between: [from, to],
-            jump,
-        } => format!(
-            "the {} of {experiment} jumps by {} {} between its samples at {} and {} s, and its interpolation does not have the time of the jump",
-            input.name().replace('_', " "),
-            significant(*jump, 3),
-            input.unit(),
-            significant(*from, 6),
-            significant(*to, 6)
-        ),
-        RecordError::InputSign { experiment } => {
-            format!("the input of {experiment} has the wrong sign")
-        }
-        RecordError::ChannelFactor {
-            experiment,
-            channel,
-            factor,
-            beside_others,
-        } => format!(
-            "the {channel} of {experiment} is {} times {}",
-            significant(*factor, 4),
-            match beside_others {
-                true => "what its other channels and the model give",
-                false => "what its input and the model give",
-            }
-        ),
+    }
     }
 }
 
@@ -356,20 +306,52 @@ fn coarse_basis(basis: &CoarseBasis) -> String {
     }
 }
 
-/// The reason for which an optimum identifies no system.
-pub fn unidentified(reason: &Unidentified) -> Finding {
-    let why = match reason {
-        Unidentified::Failed => "the fit failed".to_owned(),
-        Unidentified::NoResponseOnHalfStep { error } => {
-            format!("the simulation with half the step fails: {error}")
-        }
-        Unidentified::StepDependent => {
-            "halving the step changes the response by more than 10 % of its peak".into()
-        }
-        Unidentified::Unrelated => {
-            "the residuals exceed twice the variation of every channel".into()
-        }
-        Unidentified::Noise => "the model would fit white noise equally well".into(),
+impl Unidentified {
+    /// The reason as a clause.
+    pub fn sentence(&self) -> String {
+        let why = match self {
+            Self::Failed => "the fit failed".to_owned(),
+            Self::NoResponseOnHalfStep { error } => {
+                format!("the simulation with half the step fails: {error}")
+            }
+            Self::StepDependent => {
+                "halving the step changes the response by more than 10 % of its peak".into()
+            }
+            Self::Unrelated => "the residuals exceed twice the variation of every channel".into(),
+            Self::Noise => "the model would fit white noise equally well".into(),
+        };
+        format!("no system identified: {why}")
+    }
+}
+
+/// The rival as a clause: the functions that vary, the terms that depend on the amplitude, and the difference of BIC.
+fn rival_in_words(rival: &AmplitudeRival) -> String {
+    let terms: Vec<String> = rival
+        .terms
+        .iter()
+        .map(|term| term.row().words.to_owned())
+        .collect();
+    let functions = and_list(&rival.functions);
+    let verb = match rival.functions.len() {
+        1 => "varies",
+        _ => "vary",
     };
-    Finding::of(reason, format!("no system identified: {why}"))
+    let constants = match terms.is_empty() {
+        true => "constants".to_owned(),
+        false => format!("constants with {}", and_list(&terms)),
+    };
+    let size = significant(rival.bic_difference.abs(), 2);
+    match rival.bic_difference {
+        d if terms.is_empty() => format!(
+            "constants explain the samples as well as a {functions} that {verb} with time (BIC {size} {})",
+            if d < 0.0 { "lower" } else { "higher" }
+        ),
+        d if d < FAVOURED => format!(
+            "{functions} {verb} with amplitude rather than time: {constants} explain the samples better (BIC {size} lower)"
+        ),
+        d => format!(
+            "{functions} {verb} with time or with amplitude: {constants} explain the samples as well (BIC {size} {})",
+            if d < 0.0 { "lower" } else { "higher" }
+        ),
+    }
 }

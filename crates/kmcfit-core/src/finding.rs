@@ -1,70 +1,89 @@
 //! Findings, warnings and suggestions of a document: severity, kind, quantities and a sentence.
 
-use kmcfit_core::assessment::{Doubt, Severity};
+use crate::assessment::Doubt;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt;
+
+/// What a finding means for the use of the estimates.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// What stands in the files alone.
+    Detail,
+    /// What is determined, or how.
+    #[default]
+    Note,
+    /// What is to be known, and limits no estimate beyond its interval.
+    Warning,
+    /// It limits the estimates, or an engineer must decide whether it does: a reason of the verdict.
+    Check,
+    /// The estimates are not those of the system: a reason of the verdict.
+    Inadequate,
+}
 
 /// One finding, warning or suggestion. In JSON an object with the field `kind`, the quantities of that kind, and the
 /// field `text`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Severity; absent from the document for a note.
-    #[serde(default, skip_serializing_if = "is_note")]
-    pub level: Severity,
-    /// Kind, in snake case.
-    pub kind: String,
+    #[serde(rename = "level", default, skip_serializing_if = "is_note")]
+    pub severity: Severity,
+    /// What was found, in snake case: for readers of the file. Decisions read the doubt.
+    #[serde(rename = "kind")]
+    pub check: String,
     /// Quantities by name.
     #[serde(flatten)]
     pub quantities: Map<String, Value>,
     /// The sentence.
-    pub text: String,
+    #[serde(rename = "text")]
+    pub sentence: String,
     /// The doubt that it states, for decisions; not in files.
     #[serde(skip)]
     pub doubt: Option<Doubt>,
 }
 
-fn is_note(level: &Severity) -> bool {
-    *level == Severity::Note
+fn is_note(severity: &Severity) -> bool {
+    *severity <= Severity::Note
 }
 
 impl Finding {
     /// A note without quantities.
-    pub fn new(kind: impl Into<String>, text: impl Into<String>) -> Self {
+    pub fn new(check: impl Into<String>, sentence: impl Into<String>) -> Self {
         Self {
-            level: Severity::Note,
-            kind: kind.into(),
+            severity: Severity::Note,
+            check: check.into(),
             quantities: Map::new(),
-            text: text.into(),
+            sentence: sentence.into(),
             doubt: None,
         }
     }
 
-    /// The finding as the statement of a doubt.
+    /// The finding as a statement of a doubt, with at least its severity.
     #[must_use]
     pub fn about(self, doubt: Doubt) -> Self {
         Self {
-            doubt: Some(doubt),
-            ..self
+            doubt: Some(doubt.clone()),
+            ..self.rated(doubt.severity())
         }
     }
 
     /// A finding with the fields of an object as its quantities.
-    pub fn having(kind: &str, text: impl Into<String>, quantities: Value) -> Self {
+    pub fn having(check: &str, sentence: impl Into<String>, quantities: Value) -> Self {
         let quantities = match quantities {
             Value::Object(fields) => fields,
             _ => Map::new(),
         };
         Self {
             quantities,
-            ..Self::new(kind, text)
+            ..Self::new(check, sentence)
         }
     }
 
     /// The finding about a place: a key or an experiment of the model file.
     #[must_use]
     pub fn at(mut self, position: &str) -> Self {
-        self.text = format!("{position}: {}", self.text);
+        self.sentence = format!("{position}: {}", self.sentence);
         self.with("place", position)
     }
 
@@ -77,11 +96,11 @@ impl Finding {
     }
 
     /// The finding of an enumeration's variant that serialises with its kind as the tag `kind`.
-    pub fn of(variant: &impl Serialize, text: impl Into<String>) -> Self {
+    pub fn of(variant: &impl Serialize, sentence: impl Into<String>) -> Self {
         let quantities = serde_json::to_value(variant).unwrap_or_default();
-        let mut finding = Self::having("", text, quantities);
+        let mut finding = Self::having("", sentence, quantities);
         let kind = finding.quantities.remove("kind");
-        finding.kind = kind
+        finding.check = kind
             .as_ref()
             .and_then(Value::as_str)
             .unwrap_or_default()
@@ -96,30 +115,26 @@ impl Finding {
 
     /// The finding with at least this severity.
     #[must_use]
-    pub fn rated(mut self, level: Severity) -> Self {
-        self.level = self.level.max(level);
+    pub fn rated(mut self, severity: Severity) -> Self {
+        self.severity = self.severity.max(severity);
         self
-    }
-
-    /// A quantity that is a text.
-    pub fn said(&self, name: &str) -> Option<String> {
-        Some(self.quantities.get(name)?.as_str()?.to_owned())
-    }
-
-    /// A quantity that is a number.
-    pub fn number(&self, name: &str) -> Option<f64> {
-        self.quantities.get(name)?.as_f64()
     }
 
     /// The sentences of findings.
     pub fn texts(findings: &[Self]) -> Vec<String> {
-        findings.iter().map(|f| f.text.clone()).collect()
+        findings.iter().map(|f| f.sentence.clone()).collect()
+    }
+}
+
+impl From<Doubt> for Finding {
+    fn from(doubt: Doubt) -> Self {
+        Self::of(&doubt, doubt.sentence()).about(doubt)
     }
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
+        f.write_str(&self.sentence)
     }
 }
 
