@@ -239,9 +239,8 @@ impl FittedModel<'_> {
                 .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
             step_check: self.run_assessment.step_check().cloned(),
-            model_tests: (self.run_assessment.assessment.as_ref())
-                .map(|a| a.model_tests.clone())
-                .filter(|tests| !tests.is_empty()),
+            candidates: (self.run_assessment.assessment.as_ref())
+                .and_then(|a| a.candidates.clone()),
             equation: self.run_assessment.balance.clone(),
             data: model.data.clone(),
             automatic: model.automatic.clone(),

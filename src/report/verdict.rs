@@ -5,7 +5,6 @@ use super::fit_assessment::ValidationRecord;
 use super::ratios;
 use super::run::FittedModel;
 use crate::finding::Finding;
-use crate::number_format::and_list;
 use kmcfit_core::assessment::{
     Doubt, Estimate, EstimateStatus, Implausible, VerdictLevel, estimates, verdict_assumptions,
     verdict_reasons,
@@ -181,23 +180,17 @@ impl FittedModel<'_> {
             false => Vec::new(),
         };
         let assessment = self.run_assessment.assessment.as_ref();
-        let tests = assessment.map(|a| &a.model_tests);
-        let checks = [
-            (self.run_assessment.step_check().is_some(), "step-size"),
-            (tests.is_some_and(|t| !t.bases.is_empty()), "refinement"),
-            (
-                tests.is_some_and(|t| !t.extensions.is_empty()),
-                "missing-term",
-            ),
-        ];
-        let names = checks.iter().filter(|(is_done, _)| *is_done);
-        let names: Vec<String> = names.map(|(_, name)| (*name).to_owned()).collect();
-        let checks = match names.as_slice() {
-            [] => None,
-            [only] => Some(format!("{only} check passed")),
-            several => Some(format!("{} checks passed", and_list(several))),
-        };
-        let parts: Vec<String> = residuals.into_iter().chain(checks).collect();
+        let candidates = assessment.and_then(|a| a.candidates.as_ref());
+        let step_size = self.run_assessment.step_check();
+        let step_size = step_size.map(|_| "step-size check passed".to_owned());
+        let candidates = candidates.map(|found| {
+            format!(
+                "none of {} candidates is preferred to the model",
+                found.list.len()
+            )
+        });
+        let parts = residuals.into_iter().chain(step_size).chain(candidates);
+        let parts: Vec<String> = parts.collect();
         parts.join("; ")
     }
 

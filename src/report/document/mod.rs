@@ -15,8 +15,9 @@ use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::assessment::{
-    ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, ModelTests, StepCheck,
+    ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, StepCheck,
 };
+use kmcfit_core::candidates::Candidates;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{ClassificationKind, CovarianceKind, Quantity};
 use kmcfit_core::number_format::number_or_nan;
@@ -103,9 +104,9 @@ pub struct ResultDocument {
     /// Step-size check: the optimum simulated with half the step; `null` if there is no response.
     #[serde(default)]
     pub step_check: Option<StepCheck>,
-    /// Tests of the model against larger ones: further terms, errors of the records, finer bases; absent where none applies.
+    /// Candidates: the model with one thing more, the best first; absent where they cannot be judged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model_tests: Option<ModelTests>,
+    pub candidates: Option<Candidates>,
     /// Residual of the equation of motion beside its forces; absent for fits that simulate the response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equation: Option<EquationBalance>,

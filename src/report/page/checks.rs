@@ -5,9 +5,8 @@ use crate::number_format::{at_most, significant};
 use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
 use crate::report::text::decade;
-use kmcfit_core::assessment::{
-    BasisComparison, ClassicalEstimate, EXACT, Extension, ExtensionTest, ModelTests,
-};
+use kmcfit_core::assessment::{ClassicalEstimate, EXACT};
+use kmcfit_core::candidates::{Candidate, Candidates, GAIN};
 
 /// Step-size check, tests against larger models, and the classical estimates. Empty for a fit without any.
 pub(super) fn checks(document: &ResultDocument) -> String {
@@ -30,9 +29,8 @@ pub(super) fn checks(document: &ResultDocument) -> String {
             at_most(100.0 * step.change_per_sample, 2),
         ));
     }
-    if let Some(tests) = &document.model_tests {
-        text += &bases(tests);
-        text += &extensions(document, tests);
+    if let Some(found) = &document.candidates {
+        text += &candidates(found);
     }
     let classical = document.classical.as_ref().map(ClassicalEstimate::sentence);
     text + &classical.map_or(String::new(), |classical| {
@@ -40,78 +38,39 @@ pub(super) fn checks(document: &ResultDocument) -> String {
     })
 }
 
-/// Each basis beside a finer one.
-fn bases(tests: &ModelTests) -> String {
-    if tests.bases.is_empty() {
-        return String::new();
-    }
-    let row = |b: &BasisComparison| {
-        let finer = match b.parameters {
-            1 => "a value for each half of the record".to_owned(),
-            _ => format!("{} parameters instead of {}", b.finer, b.parameters),
+/// Each candidate with its gain and what it estimates.
+fn candidates(found: &Candidates) -> String {
+    let row = |candidate: &Candidate| {
+        let estimates = candidate.estimates.iter().map(|q| {
+            let error = match q.standard_error.is_finite() {
+                true => format!(" ± {}", short(q.standard_error)),
+                false => String::new(),
+            };
+            format!("{} {}{error} {}", q.name, short(q.value), q.unit)
+        });
+        let estimates: Vec<String> = estimates.collect();
+        let how = if candidate.is_refitted {
+            "fit"
+        } else {
+            "linearised"
         };
-        vec![in_words(&b.function), finer, probability(b.p_value)]
+        vec![
+            in_words(&candidate.name),
+            short(candidate.gain),
+            how.to_owned(),
+            estimates.join(", "),
+        ]
     };
-    let rows: Vec<Vec<String>> = tests.bases.iter().map(row).collect();
-    let limit = significant(tests.p_limit, 2);
+    let rows: Vec<Vec<String>> = found.list.iter().map(row).collect();
     paragraph(&format!(
-        "Refinement: does a finer basis of a coefficient fit better than noise explains? Significant below p = {limit}."
-    )) + &table("Refinement", &["coefficient", "tried", "p-value"], &rows)
-}
-
-/// Each further term and error of a record with its estimate.
-fn extensions(document: &ResultDocument, tests: &ModelTests) -> String {
-    if tests.extensions.is_empty() {
-        return String::new();
-    }
-    let row = |test: &ExtensionTest| {
-        let (name, estimate) = extension(document, test);
-        vec![name, estimate, short(test.t)]
-    };
-    let rows: Vec<Vec<String>> = tests.extensions.iter().map(row).collect();
-    let limit = significant(tests.t_limit, 2);
-    paragraph(&format!(
-        "Missing terms and errors of the records, each added alone: estimate, and t = estimate / standard error, with \
-         cubic splines for lines between the samples of an input where these make it smaller. A candidate with |t| of {limit} \
-         or more is fitted; it counts as missing if this fit explains the residuals."
+        "What the model may lack: the model with one thing more. The gain is the decrease of N ln E + q ln N, with the variance E of the residuals \
+         under the best autoregressive noise, N samples and q parameters. A candidate is preferred from a gain of {GAIN} on; two within {GAIN} \
+         are equally good. ± is a standard error."
     )) + &table(
-        "Missing terms and errors of the records",
-        &["tried", "estimate", "t"],
+        "Candidates",
+        &["candidate", "gain", "by", "estimates"],
         &rows,
     )
-}
-
-/// Name and estimate of an extension.
-fn extension(document: &ResultDocument, test: &ExtensionTest) -> (String, String) {
-    let of = |what: &str, experiment: &str| match document.experiments.len() {
-        1 => what.to_owned(),
-        _ => format!("{what} of {experiment}"),
-    };
-    let value = |x: f64, unit: &str| format!("{} {unit}", short(x));
-    match &test.extension {
-        Extension::Term { term } => {
-            let unit = match document.is_rotation() {
-                true => term.angular_unit(),
-                false => term.unit(),
-            };
-            (in_words(term.name()), value(test.value, unit))
-        }
-        Extension::Delay { experiment } => (
-            of("delay of the response", experiment),
-            value(test.value, "s"),
-        ),
-        Extension::ClockRate { experiment } => (
-            of("rate of the clock of the response", experiment),
-            value(100.0 * test.value, "%"),
-        ),
-        Extension::Gain {
-            experiment,
-            channel,
-        } => (
-            of(&format!("gain of the {channel}"), experiment),
-            value(100.0 * test.value, "%"),
-        ),
-    }
 }
 
 /// Two significant digits, with powers of ten and a true minus sign.
@@ -124,11 +83,4 @@ fn short(x: f64) -> String {
         None => text,
     };
     text.replace('-', "−")
-}
-
-fn probability(p: f64) -> String {
-    match p < 1e-6 {
-        true => "below 0.000001".to_owned(),
-        false => at_most(p, 2),
-    }
 }

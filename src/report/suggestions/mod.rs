@@ -1,6 +1,7 @@
 //! Suggestions: changes of the model that may explain what the fit does not, and steps outside the model, the most urgent first. A change is
 //! [tried](super::trial) before it is recommended.
 
+mod candidates;
 mod records;
 mod residuals;
 mod terms;
@@ -10,6 +11,7 @@ use crate::config::Model;
 use crate::escape::shell_quoted;
 use crate::finding::Finding;
 use crate::number_format::significant;
+use candidates::about_candidates;
 use kmcfit_core::assessment::{Doubt, EXACT, POOR};
 use kmcfit_core::diagnostics::SIGNIFICANCE;
 use kmcfit_core::problem::FEW_PARAMETERS;
@@ -119,17 +121,11 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     steps.extend(about_ending(document));
     steps.extend(about_steps(document, model));
     steps.extend(about_records(document, model));
-    steps.extend(about_means(document));
     steps.extend(about_terms(document));
     steps.extend(about_friction(document));
     steps.extend(about_disturbance(document, model));
     steps.extend(about_interpolation(document));
-    if has(document, |doubt| matches!(doubt, Doubt::TimeOrAmplitude(_))) {
-        steps.push(Suggestion::outside(
-            "second_amplitude",
-            "measure a record at a second amplitude (half or twice) and fit both: it shows whether the coefficients depend on time or on amplitude",
-        ));
-    }
+    steps.extend(about_candidates(document, model));
     steps.extend(about_patterns(document));
     steps.extend(about_misfit(document, model));
     steps.extend(about_constants(document));
@@ -275,26 +271,6 @@ fn about_steps(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
         "finer_steps",
         "the time step is too coarse: use more nodes",
         vec![format!("grid.nodes={nodes}")],
-    ))
-}
-
-/// The sensor with the most significant mean of its residuals.
-fn about_means(document: &ResultDocument) -> Option<Suggestion> {
-    let means = document.doubts().filter_map(|doubt| match doubt {
-        Doubt::ResidualMean {
-            experiment,
-            channel,
-            t,
-            ..
-        } => Some((t.abs(), channel, experiment)),
-        _ => None,
-    });
-    let (_, channel, experiment) = means.max_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
-    let i = position(document, experiment)?;
-    Some(Suggestion::change(
-        "estimate_offset",
-        format!("{channel} of {experiment}: estimate the offset of the sensor"),
-        vec![format!("experiments.{i}.sensors.{channel}.offset=estimate")],
     ))
 }
 

@@ -3,8 +3,7 @@
 use super::classical::ClassicalEstimate;
 use super::implausible::Implausible;
 use super::record_error::RecordError;
-use super::refinement::CoarseBasis;
-use super::rivals::AmplitudeRival;
+use crate::candidates::Candidate;
 use crate::finding::Severity;
 use crate::record::ScoreCovariance;
 use crate::solvers::{MissingTerm, Status};
@@ -45,8 +44,16 @@ pub enum Doubt {
         /// Identified natural frequency, Hz.
         frequency: f64,
     },
-    /// A finer basis fits significantly better: the intervals exclude the error of the basis.
-    CoarseBasis(CoarseBasis),
+    /// The model with one thing more explains the samples better: the best candidate, then those that are about as good.
+    Preferred {
+        /// The candidates.
+        candidates: Vec<Candidate>,
+    },
+    /// Constants with one thing more explain the samples as well as functions that vary.
+    AsGood {
+        /// The candidates.
+        candidates: Vec<Candidate>,
+    },
     /// Functions can vary within the periods of the vibration, which cannot be told from offsets, harmonics and second modes.
     FastVariation {
         /// Names of the functions.
@@ -107,29 +114,12 @@ pub enum Doubt {
     },
     /// The residuals of the equation of motion show a term that the model does not have.
     MissingTerm(MissingTerm),
-    /// Constants and terms that depend on the amplitude explain the samples as well as functions that vary with time.
-    TimeOrAmplitude(AmplitudeRival),
     /// Two modes explain the samples of a record.
     SecondMode {
         /// Name of the experiment.
         experiment: String,
         /// Their natural frequencies, Hz, the stronger first.
         frequencies: [f64; 2],
-    },
-    /// The residuals of a channel have a mean: an offset of its sensor, or a static force.
-    ResidualMean {
-        /// Name of the experiment.
-        experiment: String,
-        /// Kind of the channel.
-        channel: String,
-        /// Mean of samples less predictions, in the SI unit of the channel.
-        mean: f64,
-        /// Mean over its standard error, which allows for autocorrelation.
-        t: f64,
-        /// Mean over the standard deviation of the residuals.
-        share: f64,
-        /// True if a static force has the same effect: the channel is a displacement, and no static force is estimated.
-        or_static_force: bool,
     },
     /// Half the width of Coulomb friction shifts an estimate by more than half a standard error and leaves residuals as small, or a larger width
     /// leaves smaller ones.
@@ -331,7 +321,10 @@ impl Doubt {
     pub fn is_cause(&self) -> bool {
         matches!(
             self,
-            Self::MissingTerm(_) | Self::SecondMode { .. } | Self::RecordError(_)
+            Self::Preferred { .. }
+                | Self::MissingTerm(_)
+                | Self::SecondMode { .. }
+                | Self::RecordError(_)
         )
     }
 }

@@ -5,12 +5,13 @@
 //! that of the system, and no artefact of the smoothing.
 
 use super::Doubt;
-use super::score_statistics::SIGNIFICANT;
 use super::span::Span;
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 
+/// Smallest `|t|` of a larger width that is no noise: of 4000 standard normal numbers one has a larger value by chance.
+const SIGNIFICANT: f64 = 4.5;
 /// Smallest shift of an estimate by half the width that is a warning, in standard errors.
 const NOTICEABLE: f64 = 0.5;
 /// Increase of the sum of squares by half the width, in units of the variance, from which the residuals prefer the whole: odds of 20 to 1

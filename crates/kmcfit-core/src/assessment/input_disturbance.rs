@@ -21,6 +21,7 @@ use crate::record::{Channel, Experiment, InputNoise, InputNoiseKind, Loss, Noise
 use crate::scalar_search::minimum;
 use crate::simd::sum::rms;
 use crate::solvers::input_error_effect;
+use crate::system::InputQuantity;
 
 /// Ratio of a stated sigma to the likely one, or its inverse, above which it is contradicted.
 const CONTRADICTED: f64 = 1.3;
@@ -101,20 +102,9 @@ fn disturbed(
 ) -> Option<Doubt> {
     let experiment = &problem.experiments[e];
     let channel = &experiment.channels[0];
-    let is_judged = channel.weighting().is_sigma()
-        && channel.loss() == Loss::Squares
-        && channel.filter().is_empty()
-        && channel.noise_model() == NoiseModel::Auto
-        && (channel.correlation().is_some() || !is_white(channel, &evaluation.predictions[e][0]));
-    let (quantity, signal) = measured(experiment).filter(|_| is_judged)?;
-    let size = rms(signal.values());
-    let error = InputNoise {
-        quantity,
-        kind: InputNoiseKind::Sensor,
-        sigma: size,
-        times: signal.times().to_vec(),
-        interpolation: signal.interpolation(),
-    };
+    let is_coloured = || !is_white(channel, &evaluation.predictions[e][0]);
+    (channel.correlation().is_some() || is_coloured()).then_some(())?;
+    let found = Disturbance::of(problem, evaluation, e)?;
     let count = residuals.len().min(MOST_SAMPLES);
     let residuals = &residuals[..count];
     let n = count as f64;
@@ -127,24 +117,74 @@ fn disturbed(
             n * mean_square(&innovations).ln() + correlation.log_determinant() + order * n.ln()
         }
     };
-    let effect = input_error_effect(problem, evaluation, e, channel, &error, count);
-    // The sigma of the channel is profiled: that of the input is the ratio times it.
-    let unit = rms(residuals);
-    let of_share = |share: f64| effect.likelihood(share * size / unit, residuals);
-    let minus_two_log = |log: f64| {
-        let [squares, determinant] = of_share(log.exp());
-        n * (squares / n).ln() + determinant
-    };
-    let (log, least) = minimum(minus_two_log, SHARES.map(f64::ln), TOLERANCE);
-    let share = log.exp();
-    let as_disturbance = least + n.ln();
-    let scale = (of_share(share)[0] / n).sqrt() / unit;
+    let as_disturbance = found.of_first + n.ln();
     (as_noise - as_disturbance > EVIDENCE).then(|| Doubt::DisturbedInput {
         experiment: experiment.name.clone(),
-        input: quantity,
-        sigma: share * scale * size,
-        share: share * scale,
+        input: found.input,
+        sigma: found.sigma,
+        share: found.share,
     })
+}
+
+/// A disturbance of the measured input of an experiment, as it would leave the residuals.
+pub(crate) struct Disturbance {
+    input: InputQuantity,
+    /// Sigma of the errors of the input, in its SI unit.
+    sigma: f64,
+    /// The same relative to the input, root mean square.
+    share: f64,
+    /// `n log(r^T R^-1 r / n) + log |R|` of the weighted residuals `r` of all samples.
+    pub(crate) minus_two_log: f64,
+    /// The same of the first samples, not weighted.
+    of_first: f64,
+}
+
+impl Disturbance {
+    /// `None` without a measured input, for several channels, and for other noise than that of one sigma.
+    pub(crate) fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<Self> {
+        let experiment = &problem.experiments[e];
+        let [channel] = experiment.channels.as_slice() else {
+            return None;
+        };
+        let is_judged = channel.weighting().is_sigma()
+            && experiment.input_error.is_none()
+            && channel.loss() == Loss::Squares
+            && channel.filter().is_empty()
+            && channel.noise_model() == NoiseModel::Auto;
+        let (input, signal) = measured(experiment).filter(|_| is_judged)?;
+        let residuals = channel.residuals(&evaluation.predictions[e][0]);
+        let residuals: Vec<f64> = residuals.take(MOST_SAMPLES).collect();
+        let (count, n) = (residuals.len(), residuals.len() as f64);
+        let size = rms(signal.values());
+        let error = InputNoise {
+            quantity: input,
+            kind: InputNoiseKind::Sensor,
+            sigma: size,
+            times: signal.times().to_vec(),
+            interpolation: signal.interpolation(),
+        };
+        let effect = input_error_effect(problem, evaluation, e, channel, &error, count);
+        // The sigma of the channel is profiled: that of the input is the ratio times it.
+        let unit = rms(&residuals);
+        let of_share = |share: f64| effect.likelihood(share * size / unit, &residuals);
+        let minus_two_log = |log: f64| {
+            let [squares, determinant] = of_share(log.exp());
+            n * (squares / n).ln() + determinant
+        };
+        let (log, least) = minimum(minus_two_log, SHARES.map(f64::ln), TOLERANCE);
+        let share = log.exp() * (of_share(log.exp())[0] / n).sqrt() / unit;
+        let weight = channel
+            .weighting()
+            .sigma(0)
+            .map_or(0.0, |sigma| 2.0 * sigma.ln());
+        Some(Self {
+            input,
+            sigma: share * size,
+            share,
+            minus_two_log: (least - n * weight) * channel.len() as f64 / n,
+            of_first: least,
+        })
+    }
 }
 
 /// True for residuals without significant autocorrelation, which leave no evidence of a disturbance.

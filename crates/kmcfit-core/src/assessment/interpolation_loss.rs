@@ -75,11 +75,6 @@ pub(super) fn is_loss(problem: &Problem, losses: &[Doubt], warning: &Doubt) -> b
     most.is_some_and(|most| (*given..most).contains(likely))
 }
 
-/// The evaluation with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.
-pub(super) fn evaluation_with_cubics(problem: &Problem, theta: &[f64]) -> Option<Evaluation> {
-    with_cubic_inputs(problem)?.evaluate(theta).ok()
-}
-
 /// The problem with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.
 pub(crate) fn with_cubic_inputs(problem: &Problem) -> Option<Problem> {
     let mut other: Option<Problem> = None;

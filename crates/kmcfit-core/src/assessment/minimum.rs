@@ -3,7 +3,6 @@
 use crate::identifiability::Factorisation;
 use crate::simd::tall_qr::Triangle;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Root `F` of `(J^T J)^-1 = F F^T` on the combinations of parameters that `J` determines, with columns of unit length for the decision.
 pub(super) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
@@ -45,18 +44,5 @@ impl Minimum {
             change,
             root,
         }
-    }
-
-    /// Probability of at least this improvement over `coarse` by noise alone.
-    pub(super) fn p_value(&self, coarse: &Self, samples: usize) -> Option<f64> {
-        let more = self
-            .rank
-            .checked_sub(coarse.rank)
-            .filter(|more| *more > 0)? as f64;
-        let left = samples.checked_sub(self.rank).filter(|left| *left > 0)? as f64;
-        let gain = (coarse.squares - self.squares).max(0.0);
-        let statistic = (gain / more) / (self.squares / left);
-        let law = FisherSnedecor::new(more, left).ok()?;
-        statistic.is_finite().then(|| law.sf(statistic))
     }
 }

@@ -17,7 +17,6 @@ mod input_jumps;
 mod input_pulses;
 mod interpolation_loss;
 mod large_covariance;
-mod larger_models;
 mod median_frequency;
 mod minimum;
 mod parts;
@@ -28,11 +27,6 @@ mod record_parameters;
 mod recovery;
 mod refinement;
 mod refit;
-mod residual_mean;
-mod rival_screen;
-mod rivals;
-mod score_statistics;
-mod second_mode;
 mod sentences;
 mod span;
 mod statistics;
@@ -50,13 +44,10 @@ pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
 pub use large_covariance::quantities_of_many;
-pub use larger_models::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use parts::Parts;
 pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility};
 pub use record_error::RecordError;
 pub use recovery::TruthErrors;
-pub use refinement::{BasisTest, CoarseBasis};
-pub use rivals::AmplitudeRival;
 pub use statistics::FitStatistics;
 pub(crate) use statistics::statistics;
 pub use step_check::StepCheck;
@@ -64,6 +55,7 @@ pub(crate) use step_check::StepCheckOutcome;
 pub use verdict::{VerdictLevel, verdict_reasons};
 
 pub(crate) use extension::{extended, with_functions};
+pub(crate) use input_disturbance::Disturbance;
 pub(crate) use interpolation_loss::with_cubic_inputs;
 pub(crate) use minimum::Minimum;
 pub use record_parameters::RecordParameter;
@@ -78,11 +70,9 @@ use input_jumps::{connected_jump, or_jump};
 use input_pulses::input_pulses;
 use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
-use rivals::amplitude_rival;
-use score_statistics::{ScoreTests, missing};
-use second_mode::{second_modes, second_modes_in_place};
 use variation::variation_warnings;
 
+use crate::candidates::Candidates;
 use crate::functions::CoefficientFunction;
 use crate::identifiability::{
     Bands, FunctionClassification, Quantities, classify_functions, condition_on_bases,
@@ -124,16 +114,15 @@ pub struct FitAssessment {
     pub classifications: Vec<FunctionClassification>,
     /// Natural frequency and damping ratio by a classical method, where a record allows it.
     pub classical: Option<ClassicalEstimate>,
-    /// Tests against larger models.
-    pub model_tests: ModelTests,
+    /// Candidates beside the model, where they can be judged.
+    pub candidates: Option<Candidates>,
     /// Parts that a request to end left out.
     pub not_done: Vec<&'static str>,
 }
 
 impl FitAssessment {
-    /// Assesses `fit`; covariance, bands and classifications for up to 64 parameters, and with `tests_bases` the test of the bases
-    /// against finer ones.
-    pub fn of(problem: &Problem, fit: &Fit, tests_bases: bool) -> Self {
+    /// Assesses `fit`; covariance, bands and classifications for up to 64 parameters, and with `judges_candidates` the candidates beside it.
+    pub fn of(problem: &Problem, fit: &Fit, judges_candidates: bool) -> Self {
         let best = &fit.best;
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
         let reports_errors = few && problem.sample_count() > problem.parameters();
@@ -141,59 +130,57 @@ impl FitAssessment {
         let is_one = problem.system.structure.is_one();
         let has_causes = reports_errors && is_one && fit.outcome.status != Status::Failed;
         let mut parts = Parts::default();
-        let plausibility = |parts: &mut Parts| {
+        let halved = |parts: &mut Parts| {
             let halved = parts.part("step-size check", || problem.on_half_step(&best.evaluation));
-            let halved = halved.unwrap_or(Ok(None));
-            let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
-            let step_check: StepCheckOutcome = match &halved {
-                Ok(refined) => Ok(refined.as_ref().map(check)),
-                Err(error) => Err(*error),
-            };
-            let statistics = statistics(problem, &best.evaluation);
-            let plausibility =
-                Plausibility::of(problem, &best.evaluation, &step_check, reports_errors);
-            (halved, step_check, statistics, plausibility)
+            halved.unwrap_or(Ok(None))
         };
-        let score_tests = || {
-            let at = || ScoreTests::at(problem, &best.parameters, &best.evaluation);
-            let applies = has_causes && tests_bases && !is_stopped();
-            applies.then(at).flatten()
+        let candidates = || {
+            let applies = has_causes && judges_candidates && !is_stopped();
+            applies
+                .then(|| Candidates::of(problem, &best.parameters))
+                .flatten()
         };
-        let ((halved, step_check, statistics, mut plausibility), score_tests) =
-            at_once(problem, || plausibility(&mut parts), score_tests);
+        let (halved, candidates) = at_once(problem, || halved(&mut parts), candidates);
+        let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
+        let step_check: StepCheckOutcome = match &halved {
+            Ok(refined) => Ok(refined.as_ref().map(check)),
+            Err(error) => Err(*error),
+        };
+        let preferred = candidates.as_ref().and_then(Candidates::preferred);
+        let lacks = preferred.is_some();
+        let mut plausibility = Plausibility::of(
+            problem,
+            &best.evaluation,
+            &step_check,
+            reports_errors,
+            lacks,
+        );
         if fit.outcome.status == Status::Failed {
             plausibility.fail();
         }
         let mut assessment = Self {
             step_check,
-            statistics,
+            statistics: statistics(problem, &best.evaluation),
             plausibility,
             effective_parameters: None,
             bands: None,
             of_many: None,
             classifications: Vec::new(),
             classical: None,
-            model_tests: ModelTests {
-                t_limit: score_statistics::SIGNIFICANT,
-                p_limit: refinement::LEVEL,
-                ..ModelTests::default()
-            },
+            candidates,
             not_done: Vec::new(),
         };
         if has_causes {
-            let (plausibility, tests) = (&assessment.plausibility, score_tests.as_ref());
+            let (plausibility, candidates) =
+                (&assessment.plausibility, assessment.candidates.as_ref());
             let found = parts.part("tests of what the model lacks", || {
-                causes(problem, fit, plausibility, tests_bases, tests)
+                cause(problem, fit, plausibility, judges_candidates, candidates)
             });
-            let (causes, tests) = found.unwrap_or_default();
-            assessment.plausibility.warnings.extend(causes);
-            assessment.model_tests.extensions = tests;
+            assessment.plausibility.warnings.extend(found.flatten());
         }
-        // Its Jacobian is as large as those that follow.
-        drop(score_tests);
         if reports_errors && assessment.plausibility.errors_hold {
             let halved = halved.ok().flatten();
-            assessment.add_errors(problem, fit, tests_bases, halved, &mut parts);
+            assessment.add_errors(problem, fit, halved, &mut parts);
         } else if !few
             && assessment.plausibility.errors_hold
             && !assessment.plausibility.is_coloured
@@ -222,34 +209,24 @@ impl FitAssessment {
         assessment
     }
 
-    /// Adds covariance, bands and classifications, and with `tests_bases` the test of the bases against finer ones.
+    /// Adds covariance, bands and classifications.
     fn add_errors(
         &mut self,
         problem: &Problem,
         fit: &Fit,
-        tests_bases: bool,
         halved: Option<Refined>,
         parts: &mut Parts,
     ) {
         let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
-        let is_one = problem.system.structure.is_one();
-        let is_coloured = self.plausibility.is_coloured;
         let found = parts.part("confidence intervals", || {
-            at_once(
-                problem,
-                || Bands::beside(problem, theta, evaluation, halved),
-                || match tests_bases && !is_coloured {
-                    true => BasisTest::of(problem, theta, evaluation),
-                    false => BasisTest::default(),
-                },
-            )
+            Bands::beside(problem, theta, evaluation, halved)
         });
-        let Some((bands, test)) = found else {
+        let Some(bands) = found else {
             return;
         };
         self.classifications = classify_functions(problem, evaluation, &bands);
-        let is_white = !is_coloured && !self.plausibility.is_disturbed;
-        if is_one {
+        let is_white = !self.plausibility.is_coloured && !self.plausibility.is_disturbed;
+        if problem.system.structure.is_one() {
             let losses = parts.part("loss by interpolation", || {
                 interpolation_losses(problem, theta, evaluation, is_white)
             });
@@ -258,13 +235,22 @@ impl FitAssessment {
             warnings.retain(|warning| !is_loss(problem, &losses, warning));
             warnings.extend(losses);
         }
-        let may_vary = may_vary(&self.plausibility);
-        if may_vary {
-            condition_on_bases(problem, &mut self.classifications, &test.doubtful);
-        }
-        if !test.comparisons.is_empty() {
-            self.model_tests.p_limit = test.level;
-            self.model_tests.bases = test.comparisons;
+        if let Some(candidates) = &self.candidates {
+            let varying = candidates.varying();
+            condition_on_bases(problem, &mut self.classifications, &varying);
+            let as_good = candidates.constants_as_good();
+            if !as_good.is_empty() {
+                let several = problem.functions.iter().enumerate();
+                let several = several.filter(|(_, function)| !is_constant(function));
+                let several: Vec<usize> = several.map(|(f, _)| f).collect();
+                condition_on_time(problem, &mut self.classifications, &several);
+                if candidates.preferred().is_none() {
+                    let doubt = Doubt::AsGood {
+                        candidates: as_good,
+                    };
+                    self.plausibility.warnings.push(doubt);
+                }
+            }
         }
         if self.plausibility.is_disturbed {
             condition_on_inputs(&mut self.classifications);
@@ -272,17 +258,6 @@ impl FitAssessment {
         if !problem.penalties.is_empty() {
             self.effective_parameters = problem.effective_parameters(theta, evaluation);
         }
-        let effective = self.effective_parameters.as_deref();
-        let covariance = bands.covariance.as_ref().filter(|_| tests_bases);
-        let rival = || amplitude_rival(problem, theta, evaluation, covariance, effective);
-        let rival = is_one.then(|| parts.part("time or amplitude", rival));
-        if let Some(rival) = rival.flatten().flatten() {
-            condition_on_time(problem, &mut self.classifications, &rival.indices);
-            (self.plausibility.warnings).push(Doubt::TimeOrAmplitude(rival));
-        }
-        let coarse = test.coarse.into_iter().filter(|_| may_vary);
-        let warnings = coarse.map(Doubt::CoarseBasis);
-        self.plausibility.warnings.extend(warnings);
         self.bands = Some(bands);
     }
 
@@ -307,66 +282,43 @@ fn is_constant(function: &CoefficientFunction) -> bool {
     function.parameters() < 2
 }
 
-/// True where a finer basis that fits better may mean that a coefficient varies: no other test explains the residuals. Correlated residuals are
-/// not tested: what leaves them also makes constants seem to vary.
-fn may_vary(plausibility: &Plausibility) -> bool {
-    let explains = |warning: &Doubt| {
-        matches!(
-            warning,
-            Doubt::DisturbedInput { .. }
-                | Doubt::ContradictedInputSigma { .. }
-                | Doubt::InterpolationLoss { .. }
-                | Doubt::CoherentResiduals { .. }
-                | Doubt::MissingTerm(_)
-                | Doubt::SecondMode { .. }
-                | Doubt::ResidualMean { .. }
-                | Doubt::FrictionWidth { .. }
-                | Doubt::RecordError(_)
-        )
-    };
-    !plausibility.warnings.iter().any(explains)
-}
-
-/// Causes of residuals that the model does not explain: the width of friction and, with `tests` of larger models, a missing term, an error of a
-/// record, or a second mode; and the score tests of terms and errors of the records, where they apply.
-fn causes(
+/// Cause of residuals that the model does not explain: the width of friction or, with `judges_candidates`, what an input or the model lacks.
+fn cause(
     problem: &Problem,
     fit: &Fit,
     plausibility: &Plausibility,
-    tests: bool,
-    score_tests: Option<&ScoreTests<'_>>,
-) -> (Vec<Doubt>, Vec<ExtensionTest>) {
+    judges_candidates: bool,
+    candidates: Option<&Candidates>,
+) -> Option<Doubt> {
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
-    let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
-    let is_modelled = is_noise && !plausibility.is_disturbed;
     let is_system = plausibility.unidentified.is_none();
     // A width of friction on which estimates depend leaves residuals like those of a missing term.
     let width = is_system.then(|| width_warning(problem, theta, evaluation));
+    if let Some(width) = width.flatten() {
+        return Some(width);
+    }
+    judges_candidates.then_some(())?;
+    let preferred = candidates.filter(|candidates| {
+        // What is noise has its own warning.
+        candidates.preferred().is_some_and(|best| !best.is_noise())
+    });
+    let preferred = preferred.map(|candidates| Doubt::Preferred {
+        candidates: candidates.ties().to_vec(),
+    });
+    let jump = || {
+        let found = connected_jump(problem, theta, evaluation).filter(|_| is_system);
+        found.map(Doubt::RecordError)
+    };
     let large = || large_error(problem, theta, evaluation).map(Doubt::RecordError);
     let pulses = || {
         let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
         Some(Doubt::RecordError(or_jump(problem, found)))
     };
-    let jump = || {
-        let found = connected_jump(problem, theta, evaluation).filter(|_| is_system);
-        found.map(Doubt::RecordError)
+    // Residuals that are white explain all; others may be those of few samples of an input.
+    let is_white = candidates.is_some_and(Candidates::explain);
+    let (white, other) = match is_white {
+        true => (preferred, None),
+        false => (None, preferred),
     };
-    match (width.flatten(), tests) {
-        (Some(width), _) => (vec![width], Vec::new()),
-        (None, false) => Default::default(),
-        (None, true) => {
-            let (small, tests) = match is_system {
-                true => missing(problem, theta, evaluation, score_tests, is_modelled),
-                false => Default::default(),
-            };
-            let found = match jump().or(small).or_else(large).or_else(pulses) {
-                Some(cause) => vec![cause],
-                None => match problem.functions.iter().all(is_constant) {
-                    true => second_modes(problem, evaluation, &plausibility.residuals),
-                    false => second_modes_in_place(problem, theta, evaluation),
-                },
-            };
-            (found, tests)
-        }
-    }
+    jump().or_else(large).or(white).or_else(pulses).or(other)
 }

@@ -4,16 +4,18 @@ use super::doubt::{Doubt, Unidentified};
 use super::input_correlation::coherent_residuals;
 use super::input_disturbance::input_warnings;
 use super::median_frequency::median_frequency;
-use super::residual_mean::mean_warnings;
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::{ResidualDiagnostics, rms};
 use crate::functions::CoefficientKind;
+use crate::noise::CorrelationLaw;
 use crate::objective::{Evaluation, all_diagnostics, channel_fit_percent};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, ScoreCovariance, Weighting};
-use crate::signal::median;
+use crate::signal::{median, median_spacing};
 use crate::system::Excitation;
+use nalgebra::Complex;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::f64::consts::{PI, TAU};
 
 /// Largest change of the predictions by halving the step, as a share of the largest sample; beyond it the step-size error
 /// dominates the fit.
@@ -43,6 +45,12 @@ const PERIODS_PER_SAMPLE: f64 = 0.4;
 /// Largest deviation of equally spaced samples from their grid, as a share of the spacing.
 const EVEN: f64 = 0.01;
 
+/// Frequency of a pole, relative to the natural frequency, below which it is no resonance, and its bandwidth relative to its frequency.
+const LOW: f64 = 0.15;
+const NARROW: f64 = 0.25;
+/// Order from which a process describes more than noise.
+const MANY: usize = 8;
+
 /// Plausibility of a fit.
 #[derive(Debug, Clone)]
 pub struct Plausibility {
@@ -62,19 +70,21 @@ pub struct Plausibility {
 
 impl Plausibility {
     /// Plausibility of the optimum `evaluation`, given its step-size check; `reports_errors` is true if standard errors
-    /// are reported also for samples without sigma.
+    /// are reported also for samples without sigma, `lacks` if a candidate is preferred to the model.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
         step_check: &StepCheckOutcome,
         reports_errors: bool,
+        lacks: bool,
     ) -> Self {
         let unidentified = unidentified(problem, evaluation, step_check).or_else(|| {
             (reports_errors && noise_fits_equally(problem, evaluation))
                 .then_some(Unidentified::Noise)
         });
         let residuals = all_diagnostics(problem, evaluation);
-        let (coloured, poor) = coloured_and_poor(problem, &residuals, reports_errors);
+        let (coloured, poor) =
+            coloured_and_poor(problem, evaluation, &residuals, reports_errors, lacks);
         let unexplained = unexplained(problem, evaluation)
             .or_else(|| coarse(problem, evaluation, step_check))
             .or_else(|| {
@@ -105,13 +115,8 @@ impl Plausibility {
             true => coherent_residuals(problem, evaluation),
             false => None,
         };
-        let means = match unidentified.is_none() && reports_errors {
-            true => mean_warnings(problem, evaluation),
-            false => Vec::new(),
-        };
         let warnings = unexplained
             .into_iter()
-            .chain(means)
             .chain(inputs)
             .chain(coherent)
             .chain(optimistic)
@@ -129,7 +134,7 @@ impl Plausibility {
     /// Plausibility of the optimum `evaluation`, with standard errors reported for all samples.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let step_check = step_check(problem, evaluation);
-        Self::of(problem, evaluation, &step_check, true)
+        Self::of(problem, evaluation, &step_check, true, true)
     }
 
     /// Marks a failed fit.
@@ -146,22 +151,44 @@ fn score_covariance(problem: &Problem) -> ScoreCovariance {
         .unwrap_or_default()
 }
 
-/// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly.
+/// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly. Large residuals that a process of low
+/// order without a resonance makes white are noise, where the model lacks nothing.
 fn coloured_and_poor(
     problem: &Problem,
+    evaluation: &Evaluation,
     residuals: &[Vec<ResidualDiagnostics>],
     reports_errors: bool,
+    lacks: bool,
 ) -> (bool, bool) {
+    let frequency = median_frequency(problem, evaluation);
     let (mut coloured, mut poor) = (false, false);
     for (channel, found) in problem.channels().zip(residuals.iter().flatten()) {
         let is_judged = reports_errors || channel.weighting().sigma(0).is_some();
         let is_coloured = found.whiteness.p_value < CERTAIN && found.fit_percent < ROUNDED;
         if is_judged && (is_coloured || channel.correlation().is_some()) {
             coloured |= is_coloured;
-            poor |= found.fit_percent < POOR;
+            let is_noise = !lacks && !is_coloured && is_broad(channel, frequency);
+            poor |= found.fit_percent < POOR && !is_noise;
         }
     }
     (coloured, poor)
+}
+
+/// True for noise of a channel by a process of low order without a resonance, which a term missing from the model leaves: no pair of poles at a
+/// frequency `f > 0.15 f_n` has a bandwidth `-ln |z| / (pi dt) < f / 4`.
+fn is_broad(channel: &Channel, natural_frequency: Option<f64>) -> bool {
+    let Some(CorrelationLaw::Autoregressive(process)) = channel.correlation().map(|c| c.law())
+    else {
+        return false;
+    };
+    let spacing = median_spacing(channel.times());
+    let least = LOW * natural_frequency.unwrap_or(0.0);
+    let is_narrow = |pole: &Complex<f64>| {
+        let frequency = pole.arg().abs() / (TAU * spacing);
+        let bandwidth = -pole.norm().ln() / (PI * spacing);
+        frequency > least && bandwidth < NARROW * frequency
+    };
+    process.order() < MANY && !process.poles().iter().any(is_narrow)
 }
 
 /// Reason for which no statement on the functions is meaningful, if any.

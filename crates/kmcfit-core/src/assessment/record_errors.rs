@@ -37,44 +37,6 @@ const FACTOR: f64 = 1.05;
 /// Largest factor or inverse: a million is that between m and um.
 const MOST_FACTOR: f64 = 2e6;
 
-/// The error of a record by a significant parameter of the score tests, where a refit with it leaves white residuals.
-pub(super) fn small_error(
-    problem: &Problem,
-    theta: &[f64],
-    parameter: RecordParameter,
-    value: f64,
-) -> Option<RecordError> {
-    match parameter {
-        RecordParameter::Delay(e) => {
-            let clock = Clock {
-                delay: value,
-                rate: 0.0,
-            };
-            let (clock, fitted) = on_best_clock(problem, theta, parameter, clock)?;
-            fitted.is_white().then(|| delay(problem, e, clock))
-        }
-        RecordParameter::Rate(e) => {
-            // After a single event, such as a step, a rate is as good as a delay.
-            if let Some(delay) = small_error(problem, theta, RecordParameter::Delay(e), 0.0) {
-                return Some(delay);
-            }
-            let clock = Clock {
-                delay: 0.0,
-                rate: value,
-            };
-            let (clock, fitted) = on_best_clock(problem, theta, parameter, clock)?;
-            fitted.is_white().then(|| difference(problem, e, clock))
-        }
-        RecordParameter::Offset(..) | RecordParameter::Drift(..) => None,
-        RecordParameter::Gain(e, c) => {
-            let (gain, fitted) = with_best_gain(problem, theta, e, c, 1.0 + value)?;
-            // A refit that leaves the estimate of the test has a scale that nothing determines.
-            let is_near = (0.5..=2.0).contains(&(gain / (1.0 + value)));
-            (fitted.is_white() && is_near && is_factor(gain)).then(|| factor(problem, e, c, gain))
-        }
-    }
-}
-
 fn is_factor(gain: f64) -> bool {
     (1.0 / MOST_FACTOR..=MOST_FACTOR).contains(&gain.abs())
         && !(1.0 / FACTOR..=FACTOR).contains(&gain)

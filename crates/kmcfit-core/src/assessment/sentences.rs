@@ -1,13 +1,10 @@
 //! Doubts about a fit in words, each a clause that stands alone.
 
-use super::{AmplitudeRival, CoarseBasis, Doubt, Implausible, Unidentified};
+use super::{Doubt, Implausible, Unidentified};
+use crate::candidates::Candidate;
 use crate::number_format::{and_list, percent, significant, times_in_words};
 use crate::record::ScoreCovariance;
-use crate::spans::span_words;
 use serde_json::json;
-
-/// Difference of BIC beyond which the rival is favoured.
-const FAVOURED: f64 = -10.0;
 
 impl Doubt {
     /// The doubt as a clause.
@@ -49,7 +46,11 @@ impl Doubt {
             "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz other frequencies fit equally well; sample faster or at \
              unequal intervals"
         ),
-        Self::CoarseBasis(basis) => coarse_basis(basis),
+        Self::Preferred { candidates } => preferred(candidates),
+        Self::AsGood { candidates } => {
+            let words: Vec<&str> = candidates.iter().map(|c| c.words.as_str()).collect();
+            format!("{} explain the samples as well as the model", words.join(", or "))
+        }
         Self::FastVariation {
             functions,
             per_period,
@@ -117,7 +118,6 @@ impl Doubt {
             significant(missing.t, 2),
             percent(100.0 * missing.share, 1),
         ),
-        Self::TimeOrAmplitude(rival) => rival_in_words(rival),
         Self::SecondMode {
             frequencies: [first, second],
             ..
@@ -128,19 +128,6 @@ impl Doubt {
         ),
         Self::RecordError(error) => error.sentence(),
         Self::ClassicalDisagrees(estimate) => estimate.sentence(),
-        Self::ResidualMean {
-            experiment,
-            channel,
-            t,
-            share,
-            or_static_force,
-            ..
-        } => format!(
-            "the residuals of the {channel} of {experiment} have a mean of {} standard deviations (t = {}): an offset of the sensor{}",
-            significant(*share, 2),
-            significant(*t, 2),
-            if *or_static_force { " or a static force" } else { "" }
-        ),
         Self::FrictionWidth {
             estimate,
             shift,
@@ -276,34 +263,21 @@ impl Doubt {
     }
 }
 
-fn p_in_words(p: f64) -> String {
-    match p < 1e-6 {
-        true => "p < 1e-6".to_owned(),
-        false => format!("p = {}", significant(p, 2)),
-    }
-}
-
-fn coarse_basis(basis: &CoarseBasis) -> String {
-    let CoarseBasis {
-        function, p_value, ..
-    } = basis;
-    let p = p_in_words(*p_value);
-    match (basis.halves, basis.knots) {
-        (Some([first, second]), _) => format!(
-            "the {function} is not constant: {} {unit} in the first half of the record, {} {unit} in the second ({p})",
-            significant(first, 4),
-            significant(second, 4),
-            unit = basis.unit
-        ),
-        (None, knots) => format!(
-            "the basis of the {function} is too coarse ({p}): {} changes it by up to {:.0} % on {}",
-            knots.map_or("a finer one".to_owned(), |knots| format!(
-                "one of {knots} knots"
-            )),
-            100.0 * basis.change,
-            span_words(&basis.spans)
-        ),
-    }
+/// The best candidate, and those that the record does not tell from it.
+fn preferred(candidates: &[Candidate]) -> String {
+    let Some((best, others)) = candidates.split_first() else {
+        return String::new();
+    };
+    let gain = significant(best.gain, 2);
+    let names: Vec<&str> = others.iter().map(|c| c.words.as_str()).collect();
+    let others = match names.is_empty() {
+        true => String::new(),
+        false => format!("; as good: {}", names.join("; ")),
+    };
+    format!(
+        "the model lacks {}, which explains the samples better (gain {gain}) and biases the estimates{others}",
+        best.words
+    )
 }
 
 impl Unidentified {
@@ -321,37 +295,5 @@ impl Unidentified {
             Self::Noise => "the model would fit white noise equally well".into(),
         };
         format!("no system identified: {why}")
-    }
-}
-
-/// The rival as a clause: the functions that vary, the terms that depend on the amplitude, and the difference of BIC.
-fn rival_in_words(rival: &AmplitudeRival) -> String {
-    let terms: Vec<String> = rival
-        .terms
-        .iter()
-        .map(|term| term.row().words.to_owned())
-        .collect();
-    let functions = and_list(&rival.functions);
-    let verb = match rival.functions.len() {
-        1 => "varies",
-        _ => "vary",
-    };
-    let constants = match terms.is_empty() {
-        true => "constants".to_owned(),
-        false => format!("constants with {}", and_list(&terms)),
-    };
-    let size = significant(rival.bic_difference.abs(), 2);
-    match rival.bic_difference {
-        d if terms.is_empty() => format!(
-            "constants explain the samples as well as a {functions} that {verb} with time (BIC {size} {})",
-            if d < 0.0 { "lower" } else { "higher" }
-        ),
-        d if d < FAVOURED => format!(
-            "{functions} {verb} with amplitude rather than time: {constants} explain the samples better (BIC {size} lower)"
-        ),
-        d => format!(
-            "{functions} {verb} with time or with amplitude: {constants} explain the samples as well (BIC {size} {})",
-            if d < 0.0 { "lower" } else { "higher" }
-        ),
     }
 }

@@ -7,13 +7,14 @@ use crate::functions::{
 };
 use crate::problem::Problem;
 use crate::record::Sensor;
+use crate::structure::Law;
 use crate::system::Grid;
 
 /// One thing that may be added to a model. Functions, experiments and channels are named by their indices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Addition {
     /// A force with a constant coefficient.
-    Term(CoefficientKind),
+    Term(CoefficientKind, Law),
     /// A function that varies slowly: a polynomial in place of a constant.
     Variation {
         /// Index of the function.
@@ -35,6 +36,11 @@ pub enum Addition {
     },
     /// A parameter of a record.
     Record(RecordParameter),
+    /// Errors of the measured input of an experiment, or an unmeasured force.
+    Disturbance {
+        /// Index of the experiment.
+        experiment: usize,
+    },
     /// Cubic splines in place of lines between the samples of the inputs.
     CubicInputs,
     /// A sensor whose samples have parts of the square and the cube of the response.
@@ -79,6 +85,8 @@ pub(super) enum Family {
     Timing,
     /// A channel has another factor.
     Factor,
+    /// Noise that enters through the equation of motion.
+    Noise,
 }
 
 impl Addition {
@@ -90,7 +98,7 @@ impl Addition {
             _ => Family::Elastic,
         };
         match self {
-            Self::Term(kind) => of_kind(kind),
+            Self::Term(kind, _) => of_kind(kind),
             Self::Variation { function, .. }
             | Self::FinerBasis { function }
             | Self::Jump { function, .. } => of_kind(problem.functions.get(function).quantity),
@@ -98,6 +106,7 @@ impl Addition {
             Self::Record(RecordParameter::Delay(_) | RecordParameter::Rate(_))
             | Self::CubicInputs => Family::Timing,
             Self::Record(RecordParameter::Gain(..)) => Family::Factor,
+            Self::Disturbance { .. } => Family::Noise,
             Self::SensorCurve { .. } | Self::Tone { .. } | Self::SecondMode { .. } => {
                 Family::Frequency
             }
@@ -113,10 +122,9 @@ impl Addition {
         further: &[f64],
     ) -> Option<(Problem, Vec<f64>)> {
         match self {
-            Self::Term(kind) => {
-                let width = super::columns::friction_width(problem, theta)?;
+            Self::Term(kind, law) => {
                 let function = CoefficientFunction::constant(kind, 0.0, problem.functions.nodes());
-                let further_terms = vec![(function, kind.law(width)?)];
+                let further_terms = vec![(function, law)];
                 let (changed, mut start) = extended(problem, theta, further_terms)?;
                 start[problem.functions.scalar_range().start] = *further.first()?;
                 Some((changed, start))
@@ -155,7 +163,10 @@ impl Addition {
             Self::Record(RecordParameter::Rate(_)) => None,
             Self::Record(parameter) => with_record(problem, theta, parameter, *further.first()?),
             Self::CubicInputs => Some((with_cubic_inputs(problem)?, theta.to_vec())),
-            Self::SensorCurve { .. } | Self::Tone { .. } | Self::SecondMode { .. } => None,
+            Self::Disturbance { .. }
+            | Self::SensorCurve { .. }
+            | Self::Tone { .. }
+            | Self::SecondMode { .. } => None,
         }
     }
 }

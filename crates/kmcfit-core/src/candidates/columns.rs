@@ -60,8 +60,10 @@ impl LinearCandidate {
         let changes = self.judged.estimate.as_slice();
         let starts = theta.iter().copied().chain(std::iter::repeat(0.0));
         let at: Vec<f64> = starts.zip(changes).map(|(a, d)| a + d).collect();
-        let is_single = matches!(self.addition, Addition::Term(_) | Addition::Record(_));
-        Candidate {
+        let is_single = matches!(self.addition, Addition::Term(..) | Addition::Record(_));
+        let candidate = Candidate {
+            name: self.addition.name(problem),
+            words: String::new(),
             additions: vec![self.addition],
             to_constants: false,
             gain: misfit - self.judged.misfit,
@@ -69,11 +71,17 @@ impl LinearCandidate {
             order: self.judged.order,
             // A parameter of the linear stage is the last.
             estimates: match (is_single, self.addition) {
-                (true, Addition::Term(kind)) => last(kind.name(), kind.unit(), &at, &self.judged),
+                (true, Addition::Term(kind, _)) => {
+                    last(kind.name(), kind.unit(), &at, &self.judged)
+                }
                 (true, addition) => estimates(addition, problem, &at, &self.judged),
                 _ => Vec::new(),
             },
-            refit: None,
+            is_refitted: false,
+        };
+        Candidate {
+            words: candidate.in_words(problem),
+            ..candidate
         }
     }
 
@@ -91,12 +99,6 @@ fn last(name: &str, unit: &str, at: &[f64], judged: &Judged) -> Vec<Quantity> {
         ..Quantity::new(name, unit, at[i])
     };
     vec![quantity.with_covariance(&judged.covariance, judged.degrees)]
-}
-
-/// Width of the sign of the velocity that friction gets.
-pub(super) fn friction_width(problem: &Problem, theta: &[f64]) -> Option<f64> {
-    let evaluation = problem.evaluate(theta).ok()?;
-    width(&evaluation)
 }
 
 fn width(evaluation: &Evaluation) -> Option<f64> {
@@ -236,9 +238,9 @@ fn of_structure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Op
         }
     }
     let first = longer.functions.scalar_range().start - terms.len();
-    for (i, (kind, _)) in terms.iter().enumerate() {
+    for (i, (kind, law)) in terms.iter().enumerate() {
         all.push(Column {
-            addition: Addition::Term(*kind),
+            addition: Addition::Term(*kind, *law),
             columns: columns(first + i..first + i + 1),
             searched: 0,
         });

@@ -15,8 +15,8 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::signal::median;
 
-/// The candidates beside constants that are about as good as the model or better, in place of all functions of a problem with white noise that
-/// vary; `None` where none varies.
+/// The candidates beside constants, in place of all functions of a problem with white noise that vary, that are about as good as the model or
+/// better; `None` where none varies, or constants alone are as good.
 pub(super) fn of(
     problem: &Problem,
     theta: &[f64],
@@ -29,16 +29,12 @@ pub(super) fn of(
     let refit = Refit::of(constants, &start)?;
     let alone = Linearised::at(&refit.problem, refit.evaluation()).own();
     let beside = Candidates::at(&refit.problem, &refit.fit.best.parameters, Some(own))?;
-    let alone = Candidate {
-        additions: Vec::new(),
-        to_constants: true,
-        gain: own - alone.misfit,
-        parameters: 0,
-        order: alone.order,
-        estimates: Vec::new(),
-        refit: Some(refit.fit.best.parameters.clone()),
-    };
-    let others = beside.list.into_iter().filter(|c| c.refit.is_some());
+    // Where constants alone are as good, a function that varies is a finer basis than the samples need, and no wrong one.
+    (own - alone.misfit < -GAIN).then_some(())?;
+    let others = beside
+        .list
+        .into_iter()
+        .filter(|c| c.is_refitted && c.gain > -GAIN);
     // A function that varies in another basis is no constant.
     let is_constant = |addition: &Addition| {
         !matches!(
@@ -47,13 +43,18 @@ pub(super) fn of(
         )
     };
     let others = others.filter(|c| c.additions.iter().all(is_constant));
-    let all = std::iter::once(alone)
-        .chain(others)
-        .map(|candidate| Candidate {
+    let all = others.map(|candidate| {
+        let candidate = Candidate {
             to_constants: true,
             ..candidate
-        });
-    Some(all.filter(|candidate| candidate.gain > -GAIN).collect())
+        };
+        Candidate {
+            name: format!("constants with {}", candidate.name),
+            words: candidate.in_words(&refit.problem),
+            ..candidate
+        }
+    });
+    Some(all.collect())
 }
 
 /// Parameters that penalties hold.

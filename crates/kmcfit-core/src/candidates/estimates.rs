@@ -22,7 +22,7 @@ pub(super) fn estimates(
     let one = |name: &str, unit: &str, i: usize| of(name, unit, value(i), vec![(i, 1.0)]);
     let last = theta.len().saturating_sub(1);
     let quantities = match addition {
-        Addition::Term(kind) => {
+        Addition::Term(kind, _) => {
             let i = problem.functions.scalar_range().start;
             vec![one(kind.name(), kind.unit(), i)]
         }
@@ -44,7 +44,9 @@ pub(super) fn estimates(
             });
             ends.into()
         }
-        Addition::FinerBasis { .. } | Addition::CubicInputs => Vec::new(),
+        Addition::FinerBasis { .. } | Addition::CubicInputs | Addition::Disturbance { .. } => {
+            Vec::new()
+        }
         Addition::Jump { function, time } => {
             let own = problem.functions.get(function);
             let first = problem.functions.ranges()[function].start;

@@ -15,14 +15,18 @@ mod estimates;
 mod penalised_misfit;
 mod refits;
 mod second_mode;
+mod words;
 
 pub use addition::Addition;
 
-use crate::assessment::{Refit, applies, uncorrelated};
+use crate::assessment::{Disturbance, Refit, applies, uncorrelated};
 use crate::identifiability::Quantity;
+use crate::number_format::number_or_nan;
+use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use columns::linear_candidates;
-use penalised_misfit::Linearised;
+use penalised_misfit::{Judged, Linearised};
+use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
 /// Decrease of the penalised misfit from which a candidate is preferred to the model, and within which two candidates are equally good.
@@ -33,26 +37,41 @@ const COLOURED: usize = 3;
 const SAMPLES_PER_PARAMETER: usize = 4;
 
 /// A candidate and its gain.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
+    /// What is added, and to what.
+    pub name: String,
+    /// The same in a sentence.
+    pub words: String,
     /// What is added: one thing, two in a pair, none for constants alone.
+    #[serde(skip)]
     pub additions: Vec<Addition>,
     /// True for additions to constants in place of the functions that vary.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub to_constants: bool,
     /// Decrease of the penalised misfit.
+    #[serde(deserialize_with = "number_or_nan")]
     pub gain: f64,
     /// Number of parameters that are added.
     pub parameters: usize,
     /// Order of the process of the residuals.
     pub order: usize,
+    /// True for a gain by a refit; otherwise it is that of a linearisation.
+    pub is_refitted: bool,
     /// What the additions estimate.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub estimates: Vec<Quantity>,
-    /// Parameters of the refit; `None` for a gain by the linearisation.
-    pub refit: Option<Vec<f64>>,
+}
+
+impl Candidate {
+    /// True for noise, which a fit may have beside the right model.
+    pub(crate) fn is_noise(&self) -> bool {
+        matches!(self.additions.as_slice(), [Addition::Disturbance { .. }])
+    }
 }
 
 /// The candidates of a fit, the best first.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Candidates {
     /// The candidates.
     pub list: Vec<Candidate>,
@@ -98,10 +117,12 @@ impl Candidates {
             true => refits::refits(problem, theta, &own, &linear),
             false => Vec::new(),
         };
+        let disturbances = disturbances(problem, &evaluation, &own);
         own.misfit = other.unwrap_or(own.misfit);
         let mut list: Vec<Candidate> = (refits.into_iter())
             .map(|found| found.candidate(problem, own.misfit))
             .collect();
+        list.extend(disturbances);
         for candidate in &linear {
             let is_same = |known: &Candidate| match known.additions.as_slice() {
                 [only] => refits::same(*only, candidate.addition),
@@ -123,6 +144,33 @@ impl Candidates {
         self.list.first().filter(|best| best.gain >= GAIN)
     }
 
+    /// True if the residuals of the candidate that is preferred are close to white.
+    pub(crate) fn explain(&self) -> bool {
+        self.preferred().is_some_and(|best| best.order < COLOURED)
+    }
+
+    /// Functions that may vary more than those of the model.
+    pub(crate) fn varying(&self) -> Vec<usize> {
+        let of_ties = self.preferred().map_or(&[][..], |_| self.ties());
+        let additions = of_ties.iter().flat_map(|c| &c.additions);
+        let functions = additions.filter_map(|addition| match addition {
+            Addition::Variation { function, .. }
+            | Addition::FinerBasis { function }
+            | Addition::Jump { function, .. } => Some(*function),
+            _ => None,
+        });
+        functions.collect()
+    }
+
+    /// Constants with one thing more that are about as good as the model, whose functions vary.
+    pub(crate) fn constants_as_good(&self) -> Vec<Candidate> {
+        let constants = self
+            .list
+            .iter()
+            .filter(|c| c.to_constants && c.gain > -GAIN);
+        constants.cloned().collect()
+    }
+
     /// Those that are about as good as the one that is preferred, which comes first; without one those that are about as good as the model.
     pub fn ties(&self) -> &[Candidate] {
         let most = self.preferred().map_or(0.0, |best| best.gain);
@@ -135,8 +183,38 @@ impl Candidates {
     }
 }
 
+/// Disturbances of the inputs of a problem with white noise, in place of the processes of the residuals.
+fn disturbances(problem: &Problem, evaluation: &Evaluation, own: &Judged) -> Vec<Candidate> {
+    let price = (problem.sample_count() as f64).ln();
+    let mut channels = 0;
+    let each = problem
+        .experiments
+        .iter()
+        .enumerate()
+        .filter_map(|(e, experiment)| {
+            let channel = channels;
+            channels += experiment.channels.len();
+            let noise = own.of_channels.get(channel)?;
+            (noise.order > 0).then_some(())?;
+            let found = Disturbance::of(problem, evaluation, e)?;
+            let addition = Addition::Disturbance { experiment: e };
+            Some(Candidate {
+                name: addition.name(problem),
+                words: addition.words(problem, &[]),
+                additions: vec![addition],
+                to_constants: false,
+                gain: noise.misfit - found.minus_two_log - price,
+                parameters: 1,
+                order: 0,
+                is_refitted: true,
+                estimates: Vec::new(),
+            })
+        });
+    each.collect()
+}
+
 /// Those that were refitted come before the others.
 fn best_first(a: &Candidate, b: &Candidate) -> Ordering {
-    let is_judged = b.refit.is_some().cmp(&a.refit.is_some());
+    let is_judged = b.is_refitted.cmp(&a.is_refitted);
     is_judged.then(b.gain.total_cmp(&a.gain))
 }

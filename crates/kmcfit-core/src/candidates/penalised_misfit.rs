@@ -64,6 +64,16 @@ pub(super) struct Judged {
     pub(super) covariance: DMatrix<f64>,
     /// Degrees of freedom of the residuals.
     pub(super) degrees: f64,
+    /// Parts of the misfit.
+    pub(super) of_channels: Vec<ChannelMisfit>,
+}
+
+/// Part of the penalised misfit of a channel.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelMisfit {
+    pub(super) misfit: f64,
+    /// Order of the process of the residuals.
+    pub(super) order: usize,
 }
 
 impl Linearised {
@@ -105,12 +115,11 @@ impl Linearised {
             let rest = residuals + &columns * &minimum.change;
             let processes = self.processes(&rest);
             let parameters = minimum.rank + searched;
-            let misfit = self.misfit(&rest, &processes, parameters);
-            let order = processes
-                .iter()
-                .flatten()
-                .map(|process| process.order)
-                .max();
+            let of_channels = self.misfits(&rest, &processes);
+            let price = (residuals.len() as f64).ln();
+            let misfits = of_channels.iter().map(|channel| channel.misfit);
+            let misfit = misfits.sum::<f64>() + parameters as f64 * price;
+            let order = of_channels.iter().map(|channel| channel.order).max();
             let order = order.unwrap_or(0);
             if found.as_ref().is_none_or(|found| misfit < found.misfit) {
                 let degrees = residuals.len().saturating_sub(minimum.rank) as f64;
@@ -123,6 +132,7 @@ impl Linearised {
                     estimate: minimum.change.clone(),
                     covariance: &minimum.root * minimum.root.transpose() * variance,
                     degrees,
+                    of_channels,
                 });
             }
             if order == 0 || round == ROUNDS {
@@ -163,24 +173,23 @@ impl Linearised {
         each.collect()
     }
 
-    fn misfit(
+    fn misfits(
         &self,
         residuals: &DVector<f64>,
         processes: &[Option<Process>],
-        parameters: usize,
-    ) -> f64 {
+    ) -> Vec<ChannelMisfit> {
         let price = (residuals.len() as f64).ln();
         let each = self.channels.iter().zip(processes);
         let of_channels = each.map(|(channel, process)| {
             let values = &residuals.as_slice()[channel.samples.clone()];
-            let variance = rms(values).powi(2);
-            let [share, order] = process
-                .as_ref()
-                .map_or([1.0, 0.0], |p| [p.share, p.order as f64]);
-            let innovations = (variance * share).max(f64::MIN_POSITIVE);
-            values.len() as f64 * innovations.ln() + order * price
+            let (share, order) = process.as_ref().map_or((1.0, 0), |p| (p.share, p.order));
+            let innovations = (rms(values).powi(2) * share).max(f64::MIN_POSITIVE);
+            ChannelMisfit {
+                misfit: values.len() as f64 * innovations.ln() + order as f64 * price,
+                order,
+            }
         });
-        of_channels.sum::<f64>() + parameters as f64 * price
+        of_channels.collect()
     }
 
     fn whiten(&self, processes: &[Option<Process>], values: &mut [f64]) {

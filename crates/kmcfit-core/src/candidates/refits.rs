@@ -47,14 +47,21 @@ impl Found {
             [only] => estimates(*only, problem, &at, &self.judged),
             _ => Vec::new(),
         };
-        Candidate {
+        let names = self.additions.iter().map(|a| a.name(problem));
+        let candidate = Candidate {
+            name: names.collect::<Vec<String>>().join(" and "),
+            words: String::new(),
             estimates,
             to_constants: false,
             gain: misfit - self.judged.misfit,
             parameters: self.parameters,
             order: self.judged.order,
-            refit: Some(self.theta),
+            is_refitted: true,
             additions: self.additions,
+        };
+        Candidate {
+            words: candidate.in_words(problem),
+            ..candidate
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Stationary autoregressive process, stated by its partial autocorrelations.
 
+use nalgebra::{Complex, DMatrix};
+
 /// Stationary autoregressive process of unit variance:
 ///
 /// ```text
@@ -71,6 +73,20 @@ impl Autoregression {
     /// Variance of the innovations `e`, relative to that of the process.
     pub fn innovation_variance(&self) -> f64 {
         self.predictor(self.order()).1
+    }
+
+    /// Poles: the roots `z` of `z^p = a_1 z^(p-1) + ... + a_p`, inside the unit circle.
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        let a = self.coefficients();
+        if a.is_empty() {
+            return Vec::new();
+        }
+        let entry = |i: usize, j: usize| match i {
+            0 => a[j],
+            _ => f64::from(u8::from(j + 1 == i)),
+        };
+        let companion = DMatrix::from_fn(a.len(), a.len(), entry);
+        companion.complex_eigenvalues().iter().copied().collect()
     }
 
     /// Best linear predictor of a value from the `count` before it (at most `p` of them are used): coefficients, and variance

@@ -49,10 +49,9 @@ pub use history::IterationRecord;
 pub(crate) use input_errors::input_error_effect;
 pub(crate) use iterate::Iterate;
 pub(crate) use linearization::{
-    add_penalties, add_priors, add_soft, linear_predictions, reduced_jacobian, weighted_jacobian,
+    add_penalties, add_priors, add_soft, linear_predictions, weighted_jacobian,
 };
 pub(crate) use methods::equation_error::NoEquationRows;
-pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{
     EquationBalance, EquationForm, EquationShare, MissingTerm, equation_balance, equation_error,
     equation_rows, missing_terms,

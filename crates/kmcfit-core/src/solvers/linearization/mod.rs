@@ -19,9 +19,7 @@ use crate::objective::{Evaluation, Gradient};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
 use crate::record::Loss;
-use nalgebra::{DMatrix, DVector};
 use reduced::of_whole_jacobian;
-use residuals::Residuals;
 
 /// Linearised predictions of an iterate.
 #[derive(Clone, Default)]
@@ -92,22 +90,6 @@ fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> 
         }),
         None => Reduced::block_by_block(problem, evaluation, timings),
     }
-}
-
-/// Weighted Jacobian `J` and residuals `r` of all samples, whitened where the noise is correlated, reduced to a matrix `R` with a row more
-/// than there are parameters and a right-hand side `b`: `|J d + r|^2 = |R d + b|^2` for every change `d` of the parameters.
-pub(crate) fn reduced_jacobian(
-    problem: &Problem,
-    evaluation: &Evaluation,
-) -> (DMatrix<f64>, DVector<f64>) {
-    if Reduced::is_computed_by_blocks(problem) {
-        let reduced = reduce(problem, evaluation, &mut Timings::default());
-        if reduced.is_finite() {
-            return reduced.matrix();
-        }
-    }
-    let residuals = Residuals::at(problem, evaluation);
-    Reduced::of(&problem.whitened_jacobian(evaluation), &residuals).matrix()
 }
 
 /// Linearised samples alone: `|F z - f|^2` is the misfit of the linearised predictions. The first variables are the changes

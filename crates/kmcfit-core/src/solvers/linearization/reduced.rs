@@ -8,7 +8,7 @@ use crate::qp::Subproblem;
 use crate::simd::LANES;
 use crate::simd::tall_qr::{BLOCK_ROWS, Triangle};
 use crate::solvers::timings::{Timings, timed};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::time::Duration;
 
 /// Number of columns up to which the reduction of a block of rows is as fast as reading the clock.
@@ -97,18 +97,6 @@ impl Reduced {
         }
         sub.residuals.push([], self.triangle.rest());
         sub
-    }
-
-    /// The same as a matrix `R` in the order of the parameters and the right-hand side `b`, with the rest in a row of its own.
-    pub(super) fn matrix(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let n = self.order.len();
-        let (mut matrix, mut right) = (DMatrix::zeros(n + 1, n), DVector::zeros(n + 1));
-        for (i, (entries, b)) in self.triangle.rows().enumerate() {
-            entries.for_each(|(position, r)| matrix[(i, self.order[position])] = r);
-            right[i] = b;
-        }
-        right[n] = self.triangle.rest();
-        (matrix, right)
     }
 
     /// Gradient of the misfit; `None` where it is not finite.

@@ -36,7 +36,7 @@ const MOST_TERMS: usize = 2;
 
 /// Kinds of terms that are tested. The factor of a quadratic or quintic stiffness is close to that of a static force or of a cubic stiffness,
 /// whose names it would take where no refit compares them: the weak form tests a quintic beside a cubic alone.
-pub(crate) const TESTED_TERMS: [CoefficientKind; 6] = [
+const TESTED_TERMS: [CoefficientKind; 6] = [
     CoefficientKind::QUADRATIC_STIFFNESS,
     CoefficientKind::CUBIC_STIFFNESS,
     CoefficientKind::QUINTIC_STIFFNESS,

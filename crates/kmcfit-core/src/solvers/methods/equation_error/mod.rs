@@ -25,7 +25,6 @@ mod widths;
 pub use balance::{EquationBalance, EquationShare, equation_balance};
 pub use equation::EquationForm;
 pub(in crate::solvers) use fit::fit;
-pub(crate) use missing_terms::TESTED_TERMS;
 pub use missing_terms::{MissingTerm, missing_terms};
 pub use rows::{NoEquationRows, equation_rows};
 
