@@ -17,7 +17,7 @@ use crate::report::timings::TimingsSummary;
 use kmcfit_core::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, StepCheck,
 };
-use kmcfit_core::candidates::Candidates;
+use kmcfit_core::candidates::{Candidate, Candidates};
 use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{ClassificationKind, CovarianceKind, Quantity};
 use kmcfit_core::number_format::number_or_nan;
@@ -332,8 +332,11 @@ impl ResultDocument {
 
     /// True where the fit or the data show two modes.
     pub(super) fn has_two_modes(&self) -> bool {
-        self.reasons()
-            .any(|reason| matches!(reason, Doubt::SecondMode { .. }))
+        self.reasons().any(|reason| match reason {
+            Doubt::SecondMode { .. } => true,
+            Doubt::Preferred { candidates } => candidates.iter().any(Candidate::has_second_mode),
+            _ => false,
+        })
     }
 
     /// The doubts among the findings of a fit of this process; a file has their sentences alone.

@@ -14,7 +14,8 @@
 use super::Doubt;
 use super::input_correlation::measured;
 use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
-use crate::noise::Correlation;
+use crate::identifiability::Quantity;
+use crate::noise::{Correlation, InputErrors};
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Experiment, InputNoise, InputNoiseKind, Loss, NoiseModel};
@@ -118,43 +119,35 @@ fn disturbed(
         }
     };
     let as_disturbance = found.of_first + n.ln();
-    (as_noise - as_disturbance > EVIDENCE).then(|| Doubt::DisturbedInput {
-        experiment: experiment.name.clone(),
-        input: found.input,
-        sigma: found.sigma,
-        share: found.share,
-    })
+    (as_noise - as_disturbance > EVIDENCE).then(|| found.doubt())
 }
 
-/// A disturbance of the measured input of an experiment, as it would leave the residuals.
+/// A disturbance of the measured input of an experiment, as it would leave the residuals of its channels, each by itself.
 pub(crate) struct Disturbance {
+    experiment: String,
     input: InputQuantity,
     /// Sigma of the errors of the input, in its SI unit.
     sigma: f64,
     /// The same relative to the input, root mean square.
     share: f64,
-    /// `n log(r^T R^-1 r / n) + log |R|` of the weighted residuals `r` of all samples.
+    /// Sum over the channels of `n log(r^T R^-1 r / n) + log |R|` of the weighted residuals `r` of all samples.
     pub(crate) minus_two_log: f64,
     /// The same of the first samples, not weighted.
     of_first: f64,
 }
 
 impl Disturbance {
-    /// `None` without a measured input, for several channels, and for other noise than that of one sigma.
+    /// `None` without a measured input, and for other noise than that of one sigma for each channel.
     pub(crate) fn of(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<Self> {
         let experiment = &problem.experiments[e];
-        let [channel] = experiment.channels.as_slice() else {
-            return None;
+        let is_judged = |channel: &Channel| {
+            channel.weighting().is_sigma()
+                && channel.loss() == Loss::Squares
+                && channel.filter().is_empty()
+                && channel.noise_model() == NoiseModel::Auto
         };
-        let is_judged = channel.weighting().is_sigma()
-            && experiment.input_error.is_none()
-            && channel.loss() == Loss::Squares
-            && channel.filter().is_empty()
-            && channel.noise_model() == NoiseModel::Auto;
-        let (input, signal) = measured(experiment).filter(|_| is_judged)?;
-        let residuals = channel.residuals(&evaluation.predictions[e][0]);
-        let residuals: Vec<f64> = residuals.take(MOST_SAMPLES).collect();
-        let (count, n) = (residuals.len(), residuals.len() as f64);
+        let is_open = experiment.input_error.is_none() && experiment.channels.iter().all(is_judged);
+        let (input, signal) = measured(experiment).filter(|_| is_open)?;
         let size = rms(signal.values());
         let error = InputNoise {
             quantity: input,
@@ -163,27 +156,68 @@ impl Disturbance {
             times: signal.times().to_vec(),
             interpolation: signal.interpolation(),
         };
-        let effect = input_error_effect(problem, evaluation, e, channel, &error, count);
-        // The sigma of the channel is profiled: that of the input is the ratio times it.
-        let unit = rms(&residuals);
-        let of_share = |share: f64| effect.likelihood(share * size / unit, &residuals);
-        let minus_two_log = |log: f64| {
-            let [squares, determinant] = of_share(log.exp());
-            n * (squares / n).ln() + determinant
+        let channels = experiment.channels.iter().zip(&evaluation.predictions[e]);
+        let channels: Vec<(Vec<f64>, f64, InputErrors)> = channels
+            .map(|(channel, predicted)| {
+                let residuals = channel.residuals(predicted).take(MOST_SAMPLES);
+                let residuals: Vec<f64> = residuals.collect();
+                let count = residuals.len();
+                let effect = input_error_effect(problem, evaluation, e, channel, &error, count);
+                let unit = rms(&residuals);
+                (residuals, unit, effect)
+            })
+            .collect();
+        // The sigma of a channel is profiled: that of the input is the ratio times it.
+        let of_channel = |(residuals, unit, effect): &(Vec<f64>, f64, InputErrors), share: f64| {
+            let n = residuals.len() as f64;
+            let [squares, determinant] = effect.likelihood(share * size / unit, residuals);
+            (
+                n * (squares / n).ln() + determinant,
+                (squares / n).sqrt() / unit,
+            )
+        };
+        let minus_two_log = |log: f64| -> f64 {
+            channels
+                .iter()
+                .map(|channel| of_channel(channel, log.exp()).0)
+                .sum()
         };
         let (log, least) = minimum(minus_two_log, SHARES.map(f64::ln), TOLERANCE);
-        let share = log.exp() * (of_share(log.exp())[0] / n).sqrt() / unit;
-        let weight = channel
-            .weighting()
-            .sigma(0)
-            .map_or(0.0, |sigma| 2.0 * sigma.ln());
+        let (_, scale) = of_channel(channels.first()?, log.exp());
+        let share = log.exp() * scale;
+        let of_all = channels
+            .iter()
+            .zip(&experiment.channels)
+            .map(|(own, channel)| {
+                let n = own.0.len() as f64;
+                let weight = channel
+                    .weighting()
+                    .sigma(0)
+                    .map_or(0.0, |sigma| 2.0 * sigma.ln());
+                (of_channel(own, log.exp()).0 - n * weight) * channel.len() as f64 / n
+            });
         Some(Self {
+            experiment: experiment.name.clone(),
             input,
             sigma: share * size,
             share,
-            minus_two_log: (least - n * weight) * channel.len() as f64 / n,
+            minus_two_log: of_all.sum(),
             of_first: least,
         })
+    }
+
+    pub(crate) fn doubt(&self) -> Doubt {
+        Doubt::DisturbedInput {
+            experiment: self.experiment.clone(),
+            input: self.input,
+            sigma: self.sigma,
+            share: self.share,
+        }
+    }
+
+    /// What it estimates.
+    pub(crate) fn estimates(&self) -> Vec<Quantity> {
+        vec![Quantity::new("sigma", self.input.unit(), self.sigma)]
     }
 }
 

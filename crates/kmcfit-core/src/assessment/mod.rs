@@ -58,8 +58,9 @@ pub(crate) use extension::{extended, with_functions};
 pub(crate) use input_disturbance::Disturbance;
 pub(crate) use interpolation_loss::with_cubic_inputs;
 pub(crate) use minimum::Minimum;
+pub(crate) use record_errors::on_best_clock;
 pub use record_parameters::RecordParameter;
-pub(crate) use record_parameters::{RecordColumns, record_parameters};
+pub(crate) use record_parameters::{Clock, RecordColumns, record_parameters};
 pub(crate) use refinement::{applies, finer_basis};
 pub(crate) use refit::{Refit, uncorrelated};
 pub(crate) use span::{Span, weighted_residuals};
@@ -72,7 +73,7 @@ use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
 use variation::variation_warnings;
 
-use crate::candidates::Candidates;
+use crate::candidates::{Candidate, Candidates};
 use crate::functions::CoefficientFunction;
 use crate::identifiability::{
     Bands, FunctionClassification, Quantities, classify_functions, condition_on_bases,
@@ -300,8 +301,15 @@ fn cause(
     judges_candidates.then_some(())?;
     let preferred = candidates.filter(|candidates| {
         // What is noise has its own warning.
-        candidates.preferred().is_some_and(|best| !best.is_noise())
+        candidates
+            .preferred()
+            .is_some_and(|best| best.disturbed_experiment().is_none())
     });
+    let noise = candidates.and_then(Candidates::preferred);
+    let noise = noise.and_then(Candidate::disturbed_experiment);
+    let noise = noise.filter(|_| is_system && !plausibility.is_disturbed);
+    let noise = noise.and_then(|e| Disturbance::of(problem, evaluation, e));
+    let noise = noise.map(|found| found.doubt());
     let preferred = preferred.map(|candidates| Doubt::Preferred {
         candidates: candidates.ties().to_vec(),
     });
@@ -320,5 +328,10 @@ fn cause(
         true => (preferred, None),
         false => (None, preferred),
     };
-    jump().or_else(large).or(white).or_else(pulses).or(other)
+    jump()
+        .or_else(large)
+        .or(white)
+        .or_else(pulses)
+        .or(other)
+        .or(noise)
 }

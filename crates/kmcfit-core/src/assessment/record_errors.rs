@@ -73,7 +73,7 @@ fn factor(problem: &Problem, e: usize, c: usize, gain: f64) -> RecordError {
 }
 
 /// Refits on the clock that a score test of its parameter leaves at rest.
-fn on_best_clock(
+pub(crate) fn on_best_clock(
     problem: &Problem,
     theta: &[f64],
     parameter: RecordParameter,

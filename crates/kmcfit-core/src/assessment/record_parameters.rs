@@ -24,7 +24,7 @@ const SMALL: f64 = 0.01;
 
 /// Clock of a response relative to that of its input.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Clock {
+pub(crate) struct Clock {
     /// Delay of the response, s.
     pub delay: f64,
     /// Relative difference of the rates.

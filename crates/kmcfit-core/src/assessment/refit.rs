@@ -24,9 +24,14 @@ pub(crate) struct Refit {
 
 impl Refit {
     pub(crate) fn of(problem: Problem, start: &[f64]) -> Option<Self> {
+        Self::within(ITERATIONS, problem, start)
+    }
+
+    /// The fit in at most so many iterations.
+    pub(crate) fn within(iterations: u64, problem: Problem, start: &[f64]) -> Option<Self> {
         let settings = FitSettings {
             stopping: Stopping {
-                iterations: ITERATIONS,
+                iterations,
                 ..Stopping::default()
             },
             ..FitSettings::default()

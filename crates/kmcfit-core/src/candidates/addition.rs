@@ -1,5 +1,6 @@
 //! What may be added to a model, and the problem with it.
 
+use super::jump;
 use super::second_mode::Mode;
 use crate::assessment::{RecordParameter, extended, with_cubic_inputs, with_functions};
 use crate::functions::{
@@ -8,7 +9,6 @@ use crate::functions::{
 use crate::problem::Problem;
 use crate::record::Sensor;
 use crate::structure::Law;
-use crate::system::Grid;
 
 /// One thing that may be added to a model. Functions, experiments and channels are named by their indices.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -156,7 +156,7 @@ impl Addition {
                     problem,
                     theta,
                     function,
-                    jump(&problem.system.grid, time)?,
+                    jump::basis(&problem.system.grid, time)?,
                     start,
                 )
             }
@@ -169,22 +169,6 @@ impl Addition {
             | Self::SecondMode { .. } => None,
         }
     }
-}
-
-/// Cells before and after a jump, and that of the node at it: its value, between those before and after, states the time within the step.
-fn jump(grid: &Grid, time: f64) -> Option<Basis> {
-    let node = ((time - grid.start()) / grid.step()).round();
-    let middle = grid.start() + node * grid.step();
-    let (start, end) = (grid.start(), grid.start() + grid.duration());
-    let knots = vec![
-        start,
-        middle - 0.5 * grid.step(),
-        middle + 0.5 * grid.step(),
-        end,
-    ];
-    knots
-        .is_sorted_by(|a, b| a < b)
-        .then_some(Basis::PiecewiseConstant { knots })
 }
 
 /// The problem with a function in another basis, and the start with these parameters of it.

@@ -12,6 +12,7 @@ mod addition;
 mod columns;
 mod constants;
 mod estimates;
+mod jump;
 mod penalised_misfit;
 mod refits;
 mod second_mode;
@@ -64,9 +65,18 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// True for noise, which a fit may have beside the right model.
-    pub(crate) fn is_noise(&self) -> bool {
-        matches!(self.additions.as_slice(), [Addition::Disturbance { .. }])
+    /// True for a second mode.
+    pub fn has_second_mode(&self) -> bool {
+        let mut additions = self.additions.iter();
+        additions.any(|addition| matches!(addition, Addition::SecondMode { .. }))
+    }
+
+    /// The experiment whose input has a disturbance, which is noise: a fit may have it beside the right model.
+    pub(crate) fn disturbed_experiment(&self) -> Option<usize> {
+        match self.additions.as_slice() {
+            [Addition::Disturbance { experiment }] => Some(*experiment),
+            _ => None,
+        }
     }
 }
 
@@ -192,10 +202,10 @@ fn disturbances(problem: &Problem, evaluation: &Evaluation, own: &Judged) -> Vec
         .iter()
         .enumerate()
         .filter_map(|(e, experiment)| {
-            let channel = channels;
+            let first = channels;
             channels += experiment.channels.len();
-            let noise = own.of_channels.get(channel)?;
-            (noise.order > 0).then_some(())?;
+            let own = own.of_channels.get(first..channels)?;
+            own.iter().any(|noise| noise.order > 0).then_some(())?;
             let found = Disturbance::of(problem, evaluation, e)?;
             let addition = Addition::Disturbance { experiment: e };
             Some(Candidate {
@@ -203,11 +213,13 @@ fn disturbances(problem: &Problem, evaluation: &Evaluation, own: &Judged) -> Vec
                 words: addition.words(problem, &[]),
                 additions: vec![addition],
                 to_constants: false,
-                gain: noise.misfit - found.minus_two_log - price,
+                gain: own.iter().map(|noise| noise.misfit).sum::<f64>()
+                    - found.minus_two_log
+                    - price,
                 parameters: 1,
                 order: 0,
                 is_refitted: true,
-                estimates: Vec::new(),
+                estimates: found.estimates(),
             })
         });
     each.collect()

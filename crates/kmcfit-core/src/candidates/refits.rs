@@ -3,10 +3,11 @@
 use super::addition::{Addition, Family};
 use super::columns::{LinearCandidate, mode_columns};
 use super::estimates::estimates;
+use super::jump;
 use super::penalised_misfit::{Judged, Linearised};
 use super::second_mode::{Mode, ModeSamples};
 use super::{COLOURED, Candidate};
-use crate::assessment::{RecordColumns, Refit};
+use crate::assessment::{Clock, RecordColumns, RecordParameter, Refit, on_best_clock};
 use crate::problem::Problem;
 use crate::simd::sum::rms;
 use crate::threads::{analyses_at_once, map};
@@ -17,6 +18,8 @@ const LOWEST: usize = 3;
 const LEAST_SQUARES: usize = 2;
 /// Most refits.
 const MOST: usize = 12;
+/// Iteration limit of a refit: those that explain the residuals take at most half as many, others approach a poor minimum in small steps.
+const ITERATIONS: u64 = 40;
 /// Degrees of the polynomials of a function that varies, each refitted from the one before.
 const DEGREES: [usize; 4] = [1, 2, 4, 8];
 /// Rounds of a refit with what is added to predictions, and change of the sum of squares at which they end.
@@ -29,10 +32,10 @@ const FARTHEST: [f64; 2] = [0.02, 0.7];
 
 /// Result of a refit.
 pub(super) struct Found {
-    additions: Vec<Addition>,
-    judged: Judged,
+    pub(super) additions: Vec<Addition>,
+    pub(super) judged: Judged,
     /// Parameters at the end of the search.
-    theta: Vec<f64>,
+    pub(super) theta: Vec<f64>,
     /// Number of parameters beyond those of the model.
     parameters: usize,
 }
@@ -187,7 +190,12 @@ fn refitted(problem: &Problem, theta: &[f64], candidate: &LinearCandidate) -> Op
     let further = candidate.further();
     match addition {
         Addition::Variation { function, .. } => ladder(problem, theta, function),
-        Addition::Jump { function, time } => jump(problem, theta, function, time, further),
+        Addition::Jump { function, time } => {
+            jump::refit(problem, theta, function, time, *further.first()?)
+        }
+        Addition::Record(parameter @ RecordParameter::Rate(_)) => {
+            clock(problem, theta, parameter, *further.first()?)
+        }
         Addition::SensorCurve {
             experiment,
             channel,
@@ -207,10 +215,15 @@ fn refitted(problem: &Problem, theta: &[f64], candidate: &LinearCandidate) -> Op
 }
 
 /// Refit of a changed problem.
-fn plain(problem: &Problem, theta: &[f64], addition: Addition, further: &[f64]) -> Option<Found> {
+pub(super) fn plain(
+    problem: &Problem,
+    theta: &[f64],
+    addition: Addition,
+    further: &[f64],
+) -> Option<Found> {
     let (changed, start) = addition.added(problem, theta, further)?;
     let parameters = changed.parameters() - problem.parameters();
-    let refit = Refit::of(changed, &start)?;
+    let refit = Refit::within(ITERATIONS, changed, &start)?;
     let judged = Linearised::at(&refit.problem, refit.evaluation()).own();
     Some(Found {
         additions: vec![addition],
@@ -261,45 +274,20 @@ fn periods(problem: &Problem, theta: &[f64]) -> f64 {
     of_record.filter(|p| p.is_finite()).fold(0.0, f64::max)
 }
 
-/// Refit of a jump, moved to where its value at the node of the jump says that it is.
-fn jump(
-    problem: &Problem,
-    theta: &[f64],
-    function: usize,
-    mut time: f64,
-    further: &[f64],
-) -> Option<Found> {
-    let first = problem.functions.ranges()[function].start;
-    let h = problem.system.grid.step();
-    let mut best: Option<Found> = None;
-    let (mut from, mut change) = (theta.to_vec(), further.to_vec());
-    for _ in 0..ROUNDS {
-        let addition = Addition::Jump { function, time };
-        let Some(mut found) = plain(problem, &from, addition, &change) else {
-            break;
-        };
-        let [before, at, after] = [0, 1, 2].map(|i| found.theta[first + i]);
-        let within = 0.5 - (at - before) / (after - before);
-        let there = time + h * within;
-        found.additions = vec![Addition::Jump {
-            function,
-            time: there,
-        }];
-        let is_better = (best.as_ref()).is_none_or(|best| found.judged.misfit < best.judged.misfit);
-        from = found.theta[..=first].to_vec();
-        from.extend(&found.theta[first + 3..]);
-        change = vec![after - before];
-        let is_there = (0.0..=1.0).contains(&(within + 0.5));
-        if is_better {
-            best = Some(found);
-        }
-        if is_there || !is_better || !there.is_finite() {
-            break;
-        }
-        // By at most a period or so at once.
-        time = there;
-    }
-    best
+/// Refit with the clock of a response at another rate. Samples that it moves beyond the record are left out, and those left stand for them.
+fn clock(problem: &Problem, theta: &[f64], parameter: RecordParameter, rate: f64) -> Option<Found> {
+    let (clock, refit) = on_best_clock(problem, theta, parameter, Clock { delay: 0.0, rate })?;
+    let mut judged = Linearised::at(&refit.problem, refit.evaluation()).own();
+    let [all, left] = [problem, &refit.problem].map(|problem| problem.sample_count() as f64);
+    judged.misfit = (judged.misfit * all / left) + all.ln();
+    let mut theta = refit.fit.best.parameters;
+    theta.push(clock.rate);
+    Some(Found {
+        additions: vec![Addition::Record(parameter)],
+        judged,
+        theta,
+        parameters: 1,
+    })
 }
 
 /// Refit with what is added to the predictions of a channel.

@@ -1,0 +1,161 @@
+//! Refits of a constant that jumps: between two of them the time moves to where a linearisation has the least squares.
+
+use super::addition::Addition;
+use super::penalised_misfit::Linearised;
+use super::refits::{Found, plain};
+use crate::assessment::{Minimum, with_functions};
+use crate::functions::{Basis, CoefficientFunction, Parameterization};
+use crate::problem::Problem;
+use crate::solvers::weighted_jacobian;
+use crate::system::Grid;
+use nalgebra::{DMatrix, DVector};
+
+/// Most refits.
+const ROUNDS: usize = 6;
+/// Number of times to which a jump may move in one round, and cells on either side of it in the next.
+const TIMES: usize = 24;
+const BESIDE: f64 = 2.0;
+
+/// The time of the node nearest to a time.
+pub(super) fn node_time(grid: &Grid, time: f64) -> f64 {
+    grid.start() + ((time - grid.start()) / grid.step()).round() * grid.step()
+}
+
+/// Cells before and after a jump, and that of the node at it: its value, between those before and after, states the time within the step.
+pub(super) fn basis(grid: &Grid, time: f64) -> Option<Basis> {
+    let (middle, half) = (node_time(grid, time), 0.5 * grid.step());
+    let (start, end) = (grid.start(), grid.start() + grid.duration());
+    let knots = vec![start, middle - half, middle + half, end];
+    (knots.is_sorted_by(|a, b| a < b)).then_some(Basis::PiecewiseConstant { knots })
+}
+
+/// Refit with a jump that begins at `time`, with this change.
+pub(super) fn refit(
+    problem: &Problem,
+    theta: &[f64],
+    function: usize,
+    time: f64,
+    change: f64,
+) -> Option<Found> {
+    let grid = &problem.system.grid;
+    let first = problem.functions.ranges()[function].start;
+    let mut range = [grid.start(), grid.start() + grid.duration()];
+    let (mut time, mut change, mut from) = (time, change, theta.to_vec());
+    let mut best: Option<Found> = None;
+    for _ in 0..ROUNDS {
+        let addition = Addition::Jump { function, time };
+        let Some(mut found) = plain(problem, &from, addition, &[change]) else {
+            break;
+        };
+        let [before, at, after] = [0, 1, 2].map(|i| found.theta[first + i]);
+        let within = 0.5 - (at - before) / (after - before);
+        let there = node_time(grid, time) + grid.step() * within;
+        found.additions = vec![Addition::Jump {
+            function,
+            time: there,
+        }];
+        if best
+            .as_ref()
+            .is_some_and(|best| found.judged.misfit >= best.judged.misfit)
+        {
+            break;
+        }
+        change = after - before;
+        from = [&found.theta[..=first], &found.theta[first + 3..]].concat();
+        let moved = moved(problem, &found.theta, function, time, range);
+        best = Some(found);
+        let Some(moved) = moved else {
+            break;
+        };
+        let cell = (range[1] - range[0]) / (TIMES + 1) as f64;
+        let is_local = (moved - time).abs() < BESIDE * cell;
+        // Within a step the value at the node moves it.
+        if is_local && cell < grid.step() {
+            break;
+        }
+        if is_local {
+            let (start, end) = (grid.start(), grid.start() + grid.duration());
+            range = [
+                (moved - BESIDE * cell).max(start),
+                (moved + BESIDE * cell).min(end),
+            ];
+        }
+        time = moved;
+    }
+    best
+}
+
+/// The time within a range at which a jump has the least squares, by one linearisation at the parameters `theta` with a jump at `time`.
+fn moved(
+    problem: &Problem,
+    theta: &[f64],
+    function: usize,
+    time: f64,
+    [from, to]: [f64; 2],
+) -> Option<f64> {
+    let grid = &problem.system.grid;
+    let (start, end) = (grid.start(), grid.start() + grid.duration());
+    let width = (to - from) / (TIMES + 1) as f64;
+    let times: Vec<f64> = (1..=TIMES).map(|i| from + width * i as f64).collect();
+    let inner = times.iter().copied().chain([time]);
+    let mut knots: Vec<f64> = [start, end].into_iter().chain(inner).collect();
+    knots.sort_by(f64::total_cmp);
+    knots.dedup_by(|a, b| *a - *b < 0.5 * grid.step());
+    *knots.last_mut()? = end;
+    let (with_jump, _) = Addition::Jump { function, time }.added(
+        problem,
+        &vec![0.0; problem.parameters()],
+        &[0.0],
+    )?;
+    let evaluation = with_jump.evaluate(theta).ok()?;
+    let own = problem.functions.get(function);
+    let basis = Basis::PiecewiseConstant {
+        knots: knots.clone(),
+    };
+    let cells = knots.len() - 1;
+    let mut list: Vec<CoefficientFunction> = problem.functions.iter().cloned().collect();
+    list[function] = CoefficientFunction {
+        owner: own.owner.clone(),
+        is_known_part: own.is_known_part,
+        offset: own.offset.clone(),
+        ..CoefficientFunction::free(own.quantity, basis, grid, vec![0.0; cells])
+    };
+    let sets = problem.functions.coefficient_sets().to_vec();
+    let functions = Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step())?
+        .with_scalars(problem.functions.scalars().to_vec());
+    let first = functions.ranges()[function].start;
+    let jacobian = weighted_jacobian(
+        &with_functions(problem, functions, Vec::new())?,
+        &evaluation,
+    );
+    let [before, after] = [theta[first], theta[first + 2]];
+    let mut residuals = Linearised::at(&with_jump, &evaluation).residuals;
+    // Without the function as it is.
+    for (j, knot) in knots[..cells].iter().enumerate() {
+        let level = if *knot < time - 0.25 * grid.step() {
+            before
+        } else {
+            after
+        };
+        residuals.axpy(-level, &jacobian.column(first + j), 1.0);
+    }
+    let others = (0..jacobian.ncols()).filter(|j| !(first..first + cells).contains(j));
+    let others: Vec<DVector<f64>> = others.map(|j| jacobian.column(j).into_owned()).collect();
+    let whole: DVector<f64> = jacobian.columns(first, cells).column_sum();
+    let mut early = DVector::zeros(jacobian.nrows());
+    let mut least: Option<(f64, f64)> = None;
+    for (j, knot) in knots[1..cells].iter().enumerate() {
+        early += jacobian.column(first + j);
+        let late = &whole - &early;
+        let columns: Vec<DVector<f64>> = others
+            .iter()
+            .cloned()
+            .chain([early.clone(), late])
+            .collect();
+        let squares = Minimum::of(&DMatrix::from_columns(&columns), &residuals).squares;
+        if least.is_none_or(|(known, _)| squares < known) {
+            least = Some((squares, *knot));
+        }
+    }
+    least.map(|(_, time)| time)
+}
