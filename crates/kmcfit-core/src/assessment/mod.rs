@@ -60,7 +60,7 @@ pub(crate) use interpolation_loss::with_cubic_inputs;
 pub(crate) use minimum::Minimum;
 pub(crate) use record_errors::on_best_clock;
 pub use record_parameters::RecordParameter;
-pub(crate) use record_parameters::{Clock, RecordColumns, record_parameters};
+pub(crate) use record_parameters::{Clock, RecordColumns, record_parameters, with_samples_of};
 pub(crate) use refinement::{applies, finer_basis};
 pub(crate) use refit::{Refit, uncorrelated};
 pub(crate) use span::{Span, weighted_residuals};

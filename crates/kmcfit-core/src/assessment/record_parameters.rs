@@ -310,6 +310,29 @@ pub(super) fn on_clock(
     })
 }
 
+/// The problem with those samples of an experiment alone that another clock leaves in the record.
+pub(crate) fn with_samples_of(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
+    let experiment = &problem.experiments[e];
+    let grid = &problem.system.grid;
+    let (start, end) = (grid.start(), grid.time(experiment.nodes - 1));
+    let is_left = |t: &f64| {
+        let moved = start + (1.0 + clock.rate) * (t - start) - clock.delay;
+        (start..=end).contains(&moved)
+    };
+    let channels = experiment.channels.iter().map(|channel| {
+        let times = channel.times();
+        let first = times.iter().position(is_left)?;
+        let count = times[first..].iter().take_while(|t| is_left(t)).count();
+        channel.part(first..first + count, grid, experiment.nodes)
+    });
+    let channels: Option<Vec<Channel>> = channels.collect();
+    let channels = channels?;
+    (problem
+        .clone()
+        .with(|parts| parts.experiments[e].channels = channels))
+    .ok()
+}
+
 /// The problem with the channels of an experiment on another clock, and white noise.
 pub(super) fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
     let experiment = &problem.experiments[e];

@@ -1,11 +1,14 @@
 //! Refits of a constant that jumps: between two of them the time moves to where a linearisation has the least squares.
 
+use super::COLOURED;
 use super::addition::Addition;
+use super::early;
 use super::penalised_misfit::Linearised;
 use super::refits::{Found, plain};
 use crate::assessment::{Minimum, with_functions};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::problem::Problem;
+use crate::simd::sum::rms;
 use crate::solvers::weighted_jacobian;
 use crate::system::Grid;
 use nalgebra::{DMatrix, DVector};
@@ -15,6 +18,12 @@ const ROUNDS: usize = 6;
 /// Number of times to which a jump may move in one round, and cells on either side of it in the next.
 const TIMES: usize = 24;
 const BESIDE: f64 = 2.0;
+
+/// Changes of a level, as shares of it, from which a jump is refitted where the response leaves that of the beginning.
+const CHANGES: [f64; 8] = [-0.4, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.4];
+/// Parts of a record, and ratio of mean squares, for that place.
+const WINDOWS: usize = 100;
+const DEPARTED: f64 = 4.0;
 
 /// The time of the node nearest to a time.
 pub(super) fn node_time(grid: &Grid, time: f64) -> f64 {
@@ -29,8 +38,66 @@ pub(super) fn basis(grid: &Grid, time: f64) -> Option<Basis> {
     (knots.is_sorted_by(|a, b| a < b)).then_some(Basis::PiecewiseConstant { knots })
 }
 
-/// Refit with a jump that begins at `time`, with this change.
+/// Refit with a jump that begins at `time`, with this change; where it leaves residuals far from white also from where the response leaves that
+/// of the beginning.
 pub(super) fn refit(
+    problem: &Problem,
+    theta: &[f64],
+    function: usize,
+    time: f64,
+    change: f64,
+) -> Option<Found> {
+    let best = from(problem, theta, function, time, change);
+    if best
+        .as_ref()
+        .is_some_and(|best| best.judged.order < COLOURED)
+    {
+        return best;
+    }
+    let from_beginning = || {
+        let quarter = early::of_first_quarter(problem, theta)?;
+        let time = departure(problem, &quarter)?;
+        let level = quarter[problem.functions.ranges()[function].start];
+        let each = CHANGES.into_iter().filter_map(|share| {
+            let addition = Addition::Jump { function, time };
+            plain(problem, &quarter, addition, &[share * level])
+        });
+        let best = each.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))?;
+        let first = problem.functions.ranges()[function].start;
+        let start = [&best.theta[..=first], &best.theta[first + 3..]].concat();
+        let change = best.theta[first + 2] - best.theta[first];
+        from(problem, &start, function, time, change)
+    };
+    let both = best.into_iter().chain(from_beginning());
+    both.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))
+}
+
+/// Time at which the samples leave the response of a fit of the first quarter: the mean square of the residuals over a hundredth of a record
+/// exceeds a multiple of that of the quarter.
+fn departure(problem: &Problem, theta: &[f64]) -> Option<f64> {
+    let evaluation = problem.evaluate(theta).ok()?;
+    let times = problem
+        .experiments
+        .iter()
+        .zip(&evaluation.predictions)
+        .filter_map(|(experiment, predictions)| {
+            let channel = experiment.channels.first()?;
+            let residuals: Vec<f64> = channel.residuals(predictions.first()?).collect();
+            let window = (residuals.len() / WINDOWS).max(1);
+            let squares: Vec<f64> = residuals.chunks(window).map(|r| rms(r).powi(2)).collect();
+            let quarter = squares[..squares.len().div_ceil(4)]
+                .iter()
+                .fold(0.0f64, |a, b| a.max(*b));
+            let first = squares
+                .iter()
+                .position(|square| *square > DEPARTED * quarter)?;
+            channel.times().get(first * window).copied()
+        });
+    times.reduce(f64::min)
+}
+
+/// Refits with a jump that begins at `time`, with this change, and moves.
+fn from(
     problem: &Problem,
     theta: &[f64],
     function: usize,
@@ -40,11 +107,11 @@ pub(super) fn refit(
     let grid = &problem.system.grid;
     let first = problem.functions.ranges()[function].start;
     let mut range = [grid.start(), grid.start() + grid.duration()];
-    let (mut time, mut change, mut from) = (time, change, theta.to_vec());
+    let (mut time, mut change, mut start) = (time, change, theta.to_vec());
     let mut best: Option<Found> = None;
     for _ in 0..ROUNDS {
         let addition = Addition::Jump { function, time };
-        let Some(mut found) = plain(problem, &from, addition, &[change]) else {
+        let Some(mut found) = plain(problem, &start, addition, &[change]) else {
             break;
         };
         let [before, at, after] = [0, 1, 2].map(|i| found.theta[first + i]);
@@ -61,7 +128,7 @@ pub(super) fn refit(
             break;
         }
         change = after - before;
-        from = [&found.theta[..=first], &found.theta[first + 3..]].concat();
+        start = [&found.theta[..=first], &found.theta[first + 3..]].concat();
         let moved = moved(problem, &found.theta, function, time, range);
         best = Some(found);
         let Some(moved) = moved else {

@@ -11,6 +11,7 @@
 mod addition;
 mod columns;
 mod constants;
+mod early;
 mod estimates;
 mod jump;
 mod penalised_misfit;
@@ -160,7 +161,7 @@ impl Candidates {
     }
 
     /// Functions that may vary more than those of the model.
-    pub(crate) fn varying(&self) -> Vec<usize> {
+    pub fn varying(&self) -> Vec<usize> {
         let of_ties = self.preferred().map_or(&[][..], |_| self.ties());
         let additions = of_ties.iter().flat_map(|c| &c.additions);
         let functions = additions.filter_map(|addition| match addition {

@@ -2,12 +2,15 @@
 
 use super::addition::{Addition, Family};
 use super::columns::{LinearCandidate, mode_columns};
+use super::early;
 use super::estimates::estimates;
 use super::jump;
 use super::penalised_misfit::{Judged, Linearised};
 use super::second_mode::{Mode, ModeSamples};
 use super::{COLOURED, Candidate};
-use crate::assessment::{Clock, RecordColumns, RecordParameter, Refit, on_best_clock};
+use crate::assessment::{
+    Clock, RecordColumns, RecordParameter, Refit, on_best_clock, with_samples_of,
+};
 use crate::problem::Problem;
 use crate::simd::sum::rms;
 use crate::threads::{analyses_at_once, map};
@@ -45,7 +48,8 @@ impl Found {
     pub(super) fn candidate(self, problem: &Problem, misfit: f64) -> Candidate {
         let changes = self.judged.estimate.as_slice();
         let starts = self.theta.iter().copied().chain(std::iter::repeat(0.0));
-        let at: Vec<f64> = starts.zip(changes).map(|(a, d)| a + d).collect();
+        let mut at: Vec<f64> = starts.zip(changes).map(|(a, d)| a + d).collect();
+        at.extend(self.theta.iter().skip(at.len()));
         let estimates = match self.additions.as_slice() {
             [only] => estimates(*only, problem, &at, &self.judged),
             _ => Vec::new(),
@@ -80,7 +84,7 @@ pub(super) fn refits(
     let found = map(
         chosen.len(),
         analyses_at_once(problem.sample_count()),
-        |i| refitted(problem, theta, chosen[i]),
+        |i| refitted(problem, theta, own, chosen[i]),
     );
     let mut found: Vec<Found> = found.into_iter().flatten().collect();
     let is_free = problem.experiments.iter().all(|e| e.is_free());
@@ -185,7 +189,12 @@ fn chosen<'a>(
     all
 }
 
-fn refitted(problem: &Problem, theta: &[f64], candidate: &LinearCandidate) -> Option<Found> {
+fn refitted(
+    problem: &Problem,
+    theta: &[f64],
+    own: &Judged,
+    candidate: &LinearCandidate,
+) -> Option<Found> {
     let addition = candidate.addition;
     let further = candidate.further();
     match addition {
@@ -194,7 +203,7 @@ fn refitted(problem: &Problem, theta: &[f64], candidate: &LinearCandidate) -> Op
             jump::refit(problem, theta, function, time, *further.first()?)
         }
         Addition::Record(parameter @ RecordParameter::Rate(_)) => {
-            clock(problem, theta, parameter, *further.first()?)
+            clock(problem, theta, own, parameter, *further.first()?)
         }
         Addition::SensorCurve {
             experiment,
@@ -233,21 +242,55 @@ pub(super) fn plain(
     })
 }
 
-/// Refits with polynomials of higher and higher degree, as long as these are better.
+/// Refits with polynomials of higher and higher degree, as long as these are better; where they leave residuals far from white also from the
+/// beginning of the record on.
 fn ladder(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
-    let range = problem.functions.ranges()[function].clone();
     let most = 0.5 * periods(problem, theta);
+    let best = climb(problem, theta, &[0.0], function, &DEGREES, most);
+    if best
+        .as_ref()
+        .is_some_and(|best| best.judged.order < COLOURED)
+    {
+        return best;
+    }
+    let lowest = &DEGREES[1..];
+    let degree = lowest[0];
+    let addition = Addition::Variation { function, degree };
+    let from_beginning = || {
+        let quarter = early::of_first_quarter(problem, theta)?;
+        let (changed, start) = addition.added(problem, &quarter, &[0.0])?;
+        let half = early::of_first_half(&changed, &start)?;
+        let range = problem.functions.ranges()[function].clone();
+        let further = half[range.start + 1..=range.start + degree].to_vec();
+        let theta = [&half[..=range.start], &half[range.start + 1 + degree..]].concat();
+        climb(problem, &theta, &further, function, lowest, most)
+    };
+    let both = best.into_iter().chain(from_beginning());
+    both.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))
+}
+
+/// Refits with polynomials of these degrees from parameters of the problem and the polynomial.
+fn climb(
+    problem: &Problem,
+    theta: &[f64],
+    further: &[f64],
+    function: usize,
+    degrees: &[usize],
+    most: f64,
+) -> Option<Found> {
+    let first = problem.functions.ranges()[function].start;
+    let (mut theta, mut further) = (theta.to_vec(), further.to_vec());
     let mut best: Option<Found> = None;
-    let mut further = vec![0.0];
-    for degree in DEGREES {
+    for &degree in degrees {
         if degree > 1 && degree as f64 > most {
             break;
         }
         let addition = Addition::Variation { function, degree };
-        let Some(found) = plain(problem, theta, addition, &further) else {
+        let Some(found) = plain(problem, &theta, addition, &further) else {
             break;
         };
-        further = found.theta[range.start + 1..=range.start + degree].to_vec();
+        further = found.theta[first + 1..=first + degree].to_vec();
+        theta = [&found.theta[..=first], &found.theta[first + 1 + degree..]].concat();
         let is_better = (best.as_ref()).is_none_or(|best| found.judged.misfit < best.judged.misfit);
         if !is_better && degree > 2 {
             break;
@@ -274,18 +317,27 @@ fn periods(problem: &Problem, theta: &[f64]) -> f64 {
     of_record.filter(|p| p.is_finite()).fold(0.0, f64::max)
 }
 
-/// Refit with the clock of a response at another rate. Samples that it moves beyond the record are left out, and those left stand for them.
-fn clock(problem: &Problem, theta: &[f64], parameter: RecordParameter, rate: f64) -> Option<Found> {
+/// Refit with the clock of a response at another rate, beside a refit of the model to the samples that the other clock leaves in the record.
+fn clock(
+    problem: &Problem,
+    theta: &[f64],
+    own: &Judged,
+    parameter: RecordParameter,
+    rate: f64,
+) -> Option<Found> {
+    let RecordParameter::Rate(e) = parameter else {
+        return None;
+    };
     let (clock, refit) = on_best_clock(problem, theta, parameter, Clock { delay: 0.0, rate })?;
     let mut judged = Linearised::at(&refit.problem, refit.evaluation()).own();
-    let [all, left] = [problem, &refit.problem].map(|problem| problem.sample_count() as f64);
-    judged.misfit = (judged.misfit * all / left) + all.ln();
-    let mut theta = refit.fit.best.parameters;
-    theta.push(clock.rate);
+    let left = Refit::of(with_samples_of(problem, e, clock)?, theta)?;
+    let beside = Linearised::at(&left.problem, left.evaluation()).own();
+    let price = (problem.sample_count() as f64).ln();
+    judged.misfit += own.misfit - beside.misfit + price;
     Some(Found {
         additions: vec![Addition::Record(parameter)],
         judged,
-        theta,
+        theta: [&refit.fit.best.parameters[..], &[clock.rate]].concat(),
         parameters: 1,
     })
 }

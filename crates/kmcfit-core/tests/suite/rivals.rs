@@ -83,7 +83,11 @@ fn said(kind: Kind, seed: u64) -> Said {
         fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let assessment = FitAssessment::of(&problem, &fit, true);
     let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
-    let is_rival = |r: &Doubt| matches!(r, Doubt::TimeOrAmplitude(_));
+    let is_rival = |r: &Doubt| match r {
+        Doubt::AsGood { .. } => true,
+        Doubt::Preferred { candidates } => candidates.iter().any(|c| c.to_constants),
+        _ => false,
+    };
     if reasons.iter().any(is_rival) {
         return Said::TimeOrAmplitude;
     }

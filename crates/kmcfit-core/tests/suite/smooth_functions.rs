@@ -5,8 +5,8 @@
 
 use crate::common::counts::{seeds, widened};
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::assessment::BasisTest;
 use kmcfit_core::builder::{Builder, ChannelSpec, Record};
+use kmcfit_core::candidates::Candidates;
 use kmcfit_core::functions::WeightRule;
 use kmcfit_core::identifiability::{Bands, Classification, classify_functions};
 use kmcfit_core::model::{AutoWord, CoefficientSpec, KnotSpec, PenaltySpec, WeightChoice};
@@ -276,11 +276,11 @@ fn only_rules_with_coverage_identify_a_smoothed_function() {
     }
 }
 
-/// The finding on the stiffness with these knots of a piecewise-linear basis.
-fn coarse_bases(data: &Data, seed: u64, coefficient: f64, stiffness: CoefficientSpec) -> BasisTest {
+/// The candidates beside a stiffness with these knots of a piecewise-linear basis.
+fn candidates(data: &Data, seed: u64, coefficient: f64, stiffness: CoefficientSpec) -> Candidates {
     let problem = problem(data, &noise(seed, coefficient), stiffness, estimated);
     let (problem, fit) = fitted(&problem);
-    BasisTest::of(&problem, &fit.best.parameters, &fit.best.evaluation)
+    Candidates::of(&problem, &fit.best.parameters).unwrap()
 }
 
 /// Three knots cannot follow an S-curve, nor 11 a sine of three cycles, in white or correlated noise; a constant stiffness differs
@@ -297,16 +297,16 @@ fn a_basis_that_is_too_coarse_is_found() {
         ] {
             let data = data(course);
             for seed in 0..seeds(2, 5) {
-                let found = coarse_bases(&data, seed, coefficient, stiffness.clone());
-                assert!(found.doubtful.contains(&2), "{found:?}");
-                assert!(found.coarse[0].p_value < 0.01);
+                let found = candidates(&data, seed, coefficient, stiffness.clone());
+                assert!(found.varying().contains(&2), "{found:?}");
             }
         }
     }
-    let found = coarse_bases(&data(falling), 0, 0.0, CoefficientSpec::constant(LEVEL));
-    let [first, second] = found.coarse[0].halves.unwrap();
-    assert!((first / LEVEL - 1.005).abs() < 0.003, "{first}");
-    assert!((second / LEVEL - 0.995).abs() < 0.003, "{second}");
+    let found = candidates(&data(falling), 0, 0.0, CoefficientSpec::constant(LEVEL));
+    let ends = &found.preferred().unwrap().estimates;
+    let [first, second] = [0, 1].map(|i| ends[i].value);
+    assert!((first / LEVEL - 1.01).abs() < 0.003, "{first}");
+    assert!((second / LEVEL - 0.99).abs() < 0.003, "{second}");
 }
 
 /// 25 knots of a piecewise-linear basis without penalty, records of a sine of one and of three cycles: where the stiffness is not
@@ -321,8 +321,8 @@ fn bands_on_twenty_five_knots_hold_or_the_basis_is_called_coarse() {
             let stiffness = CoefficientSpec::piecewise_linear(25, LEVEL);
             let problem = problem(&data, &noise(seed, 0.0), stiffness, estimated);
             let (problem, fit) = fitted(&problem);
-            let test = BasisTest::of(&problem, &fit.best.parameters, &fit.best.evaluation);
-            if !test.doubtful.contains(&2) {
+            let found = Candidates::of(&problem, &fit.best.parameters).unwrap();
+            if !found.varying().contains(&2) {
                 held.push(coverage(&problem, &fit, course).0);
             }
         }
@@ -343,8 +343,8 @@ fn a_basis_that_contains_the_function_is_seldom_called_coarse() {
     ] {
         let data = data(course);
         for seed in 0..40 {
-            let found = coarse_bases(&data, seed, 0.0, stiffness.clone());
-            alarms += usize::from(!found.doubtful.is_empty());
+            let found = candidates(&data, seed, 0.0, stiffness.clone());
+            alarms += usize::from(!found.varying().is_empty());
         }
     }
     // With a probability of 1 % each, more than 4 of 120 have a probability of 1 %.
