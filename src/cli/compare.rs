@@ -188,6 +188,7 @@ fn fitted(
         &model,
         &progress,
         RequestedFiles::figures(),
+        false,
     ) {
         Ok(_) => Ok(ComparedRun::read(name, &location.path()).map_err(|error| error.to_string())),
         Err(CommandError::Numerical(reason)) => {

@@ -8,6 +8,7 @@ use crate::config::{BuildMode, Model, ModelFile, Source, Statements, build, is_r
 use crate::error::{InputError, Location};
 use crate::fitting::{ModelFit, fit_or_no_response};
 use crate::report::document::{FailureDocument, ResultDocument};
+use crate::report::selection::{Selected, select};
 use crate::report::trial::advice;
 use crate::report::{
     CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json, summary,
@@ -45,6 +46,9 @@ pub struct Arguments {
     /// Write a row for every node into the tables over time.
     #[arg(long)]
     tables: bool,
+    /// Add what the model lacks, until nothing is preferred to it (at most five additions).
+    #[arg(long)]
+    select: bool,
     /// Print all findings, the constraints and the work of the solver.
     #[arg(long, conflicts_with = "json")]
     verbose: bool,
@@ -118,7 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         folder: &folder,
         inside: None,
     };
-    let document = fit_into(run, &file, &model, &progress, requested)?;
+    let document = fit_into(run, &file, &model, &progress, requested, arguments.select)?;
     print_results(&document, &out, &printed);
     Ok(code(&document, &printed))
 }
@@ -230,6 +234,7 @@ pub(super) fn fit_into(
     model: &Model,
     progress: &Progress,
     requested: RequestedFiles,
+    selects: bool,
 ) -> Result<ResultDocument, CommandError> {
     let clock = Instant::now();
     let full = |error| unwritable(run.folder.shown(), &error);
@@ -246,11 +251,18 @@ pub(super) fn fit_into(
     let activity = Activity::begin(progress.named_stage("assessing the fit"));
     let analysis = Instant::now();
     let found = CompletedFit::of(found);
+    let Selected {
+        file,
+        fit: found,
+        mut document,
+    } = match selects {
+        true => select(file, found, requested),
+        false => Selected::of(file, found, requested),
+    };
     let analysis = analysis.elapsed();
     let report = Instant::now();
     let (model, fit, fitted) = (&found.model, &found.fit, found.fitted(requested));
-    let mut document = fitted.document_and_figures();
-    document.advice = advice(file, model, fit, &document);
+    document.advice = advice(&file, model, fit, &document);
     document.model.folder = run.folder.path_to(run.inside, file.path.parent());
     activity.stage(progress.named_stage("writing the results"));
     let writing = fitted

@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         folder: &folder,
         inside: None,
     };
-    fit_into(new_run, &file, &model, &progress, requested)?;
+    fit_into(new_run, &file, &model, &progress, requested, false)?;
     let mut found = Compared::default();
     let names = std::iter::once(RESULT.to_owned()).chain(folder.files());
     for name in names.filter(|name| name.ends_with(".json") || name.ends_with(".csv")) {

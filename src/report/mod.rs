@@ -43,6 +43,7 @@ mod result_table;
 mod rule_names;
 mod run;
 mod run_reader;
+pub mod selection;
 pub mod study;
 pub(crate) mod suggestions;
 mod summary;

@@ -241,6 +241,7 @@ impl FittedModel<'_> {
             step_check: self.run_assessment.step_check().cloned(),
             candidates: (self.run_assessment.assessment.as_ref())
                 .and_then(|a| a.candidates.clone()),
+            selection: Vec::new(),
             equation: self.run_assessment.balance.clone(),
             data: model.data.clone(),
             automatic: model.automatic.clone(),

@@ -65,6 +65,7 @@ fn answer(document: &ResultDocument, plot: Option<&str>) -> String {
         ("Fit", fit(document)),
         ("Truth", truth(document).into_iter().collect()),
         ("Data", data_lines(document)),
+        ("Added", additions(document)),
         ("Next", Finding::texts(&document.advice)),
     ];
     text + &under_headings(lists, 6)
@@ -75,6 +76,13 @@ fn assumed(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> Vec<
     let all = document.verdict.iter().flat_map(|v| &v.assumptions);
     let of_kind = all.filter(|assumption| assumption.doubt.as_ref().is_some_and(&is_meant));
     of_kind.map(Finding::to_string).collect()
+}
+
+/// What `--select` added, with its gain.
+fn additions(document: &ResultDocument) -> Vec<String> {
+    let steps = document.selection.iter();
+    let each = steps.map(|step| format!("{} (gain {})", step.added, significant(step.gain, 2)));
+    each.collect()
 }
 
 /// What was done with the data, in one line, and the warnings about them.

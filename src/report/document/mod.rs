@@ -13,6 +13,7 @@ pub use verdict::{Verdict, level_in_words};
 use crate::config::DataFile;
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
+use crate::report::selection::SelectionStep;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, StepCheck,
@@ -107,6 +108,9 @@ pub struct ResultDocument {
     /// Candidates: the model with one thing more, the best first; absent where they cannot be judged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub candidates: Option<Candidates>,
+    /// Additions to the model by `--select`, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub selection: Vec<SelectionStep>,
     /// Residual of the equation of motion beside its forces; absent for fits that simulate the response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equation: Option<EquationBalance>,

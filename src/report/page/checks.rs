@@ -4,6 +4,7 @@ use super::table::{paragraph, table};
 use crate::number_format::{at_most, significant};
 use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
+use crate::report::selection::SelectionStep;
 use crate::report::text::decade;
 use kmcfit_core::assessment::{ClassicalEstimate, EXACT};
 use kmcfit_core::candidates::{Candidate, Candidates, GAIN};
@@ -29,6 +30,7 @@ pub(super) fn checks(document: &ResultDocument) -> String {
             at_most(100.0 * step.change_per_sample, 2),
         ));
     }
+    text += &ladder(document);
     if let Some(found) = &document.candidates {
         text += &candidates(found);
     }
@@ -36,6 +38,38 @@ pub(super) fn checks(document: &ResultDocument) -> String {
     text + &classical.map_or(String::new(), |classical| {
         paragraph(&format!("Classical estimate: {classical}."))
     })
+}
+
+/// Each addition by `--select` with what it changed.
+fn ladder(document: &ResultDocument) -> String {
+    if document.selection.is_empty() {
+        return String::new();
+    }
+    let change = |pair: Option<[f64; 2]>| {
+        pair.map_or(String::new(), |[before, after]| {
+            format!("{} → {}", significant(before, 6), significant(after, 6))
+        })
+    };
+    let row = |(i, step): (usize, &SelectionStep)| {
+        vec![
+            (i + 1).to_string(),
+            step.added.clone(),
+            short(step.gain),
+            change(step.natural_frequency),
+            change(step.damping_ratio),
+        ]
+    };
+    let rows: Vec<Vec<String>> = document.selection.iter().enumerate().map(row).collect();
+    let headings = [
+        "step",
+        "added",
+        "gain",
+        "natural frequency (Hz)",
+        "damping ratio",
+    ];
+    paragraph(
+        "What --select added to the model of the file, until no candidate was preferred, and what each addition changed.",
+    ) + &table("Additions", &headings, &rows)
 }
 
 /// Each candidate with its gain and what it estimates.

@@ -1,6 +1,6 @@
 //! The candidate that is preferred to the model as a change of the model file, or as what is to be measured.
 
-use super::{Suggestion, written};
+use super::{Step, Suggestion, written};
 use crate::config::Model;
 use crate::report::document::ResultDocument;
 use kmcfit_core::assessment::{Doubt, RecordParameter};
@@ -46,8 +46,22 @@ fn measurement(candidates: &[Candidate], is_beside_model: bool) -> Option<Sugges
     })
 }
 
+/// Overrides of the model file that add a candidate, with the numbers of the experiments in the file; `None` for what no key states.
+pub fn overrides_of(
+    candidate: &Candidate,
+    document: &ResultDocument,
+    model: &Model,
+) -> Option<Vec<String>> {
+    let own = overrides(candidate, document, model)?;
+    let change = Suggestion::change("add", "", own).in_file(&model.positions);
+    match change.step {
+        Step::Change(overrides) => Some(overrides),
+        _ => None,
+    }
+}
+
 /// Overrides of the model file that add a candidate; `None` for what no key states.
-pub fn overrides(
+fn overrides(
     candidate: &Candidate,
     document: &ResultDocument,
     model: &Model,

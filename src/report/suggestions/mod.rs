@@ -12,6 +12,7 @@ use crate::escape::shell_quoted;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use candidates::about_candidates;
+pub use candidates::overrides_of;
 use kmcfit_core::assessment::{Doubt, EXACT, POOR};
 use kmcfit_core::diagnostics::SIGNIFICANCE;
 use kmcfit_core::problem::FEW_PARAMETERS;

@@ -78,6 +78,7 @@ impl LinearCandidate {
                 _ => Vec::new(),
             },
             is_refitted: false,
+            parameters_by_name: Vec::new(),
         };
         Candidate {
             words: candidate.in_words(problem),

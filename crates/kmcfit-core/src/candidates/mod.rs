@@ -63,6 +63,9 @@ pub struct Candidate {
     /// What the additions estimate.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub estimates: Vec<Quantity>,
+    /// Functions and scalars of the refit by name with their parameters.
+    #[serde(skip)]
+    pub parameters_by_name: Vec<(String, Vec<f64>)>,
 }
 
 impl Candidate {
@@ -221,6 +224,7 @@ fn disturbances(problem: &Problem, evaluation: &Evaluation, own: &Judged) -> Vec
                 order: 0,
                 is_refitted: true,
                 estimates: found.estimates(),
+                parameters_by_name: Vec::new(),
             })
         });
     each.collect()

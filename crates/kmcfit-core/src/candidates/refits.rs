@@ -41,6 +41,8 @@ pub(super) struct Found {
     pub(super) theta: Vec<f64>,
     /// Number of parameters beyond those of the model.
     parameters: usize,
+    /// Functions and scalars by name with their parameters.
+    named: Vec<(String, Vec<f64>)>,
 }
 
 impl Found {
@@ -64,6 +66,7 @@ impl Found {
             parameters: self.parameters,
             order: self.judged.order,
             is_refitted: true,
+            parameters_by_name: self.named,
             additions: self.additions,
         };
         Candidate {
@@ -236,6 +239,7 @@ pub(super) fn plain(
     let judged = Linearised::at(&refit.problem, refit.evaluation()).own();
     Some(Found {
         additions: vec![addition],
+        named: refit.problem.functions.named(&refit.fit.best.parameters),
         judged,
         theta: refit.fit.best.parameters,
         parameters,
@@ -338,6 +342,7 @@ fn clock(
         additions: vec![Addition::Record(parameter)],
         judged,
         theta: [&refit.fit.best.parameters[..], &[clock.rate]].concat(),
+        named: Vec::new(),
         parameters: 1,
     })
 }
@@ -419,6 +424,7 @@ fn beside(
             }],
             judged,
             theta: theta.clone(),
+            named: Vec::new(),
             parameters,
         });
         if is_at_rest {

@@ -232,23 +232,31 @@ impl Parameterization {
 
     /// The start with the parameters `theta` of another parameterisation in the functions and scalars of the same name and number.
     pub fn start_at(&self, other: &Self, theta: &[f64]) -> Vec<f64> {
-        let named = |parts: &Self| -> Vec<(String, Range<usize>)> {
-            let functions = parts.list.iter().map(CoefficientFunction::name);
-            let functions = functions.zip(parts.ranges().iter().cloned());
-            let scalars = parts.scalars.iter().map(|scalar| scalar.name.clone());
-            let scalars = scalars.zip(parts.scalar_range().map(|i| i..i + 1));
-            functions.chain(scalars).collect()
-        };
-        let others = named(other);
-        let mut start = self.start();
-        for (name, range) in named(self) {
-            let same =
-                |(other, of): &&(String, Range<usize>)| *other == name && of.len() == range.len();
-            if let Some((_, of)) = others.iter().find(same) {
-                start[range].copy_from_slice(&theta[of.clone()]);
-            }
-        }
-        start
+        self.start_of(&other.named(theta))
+    }
+
+    /// Functions and scalars by name with their parameters.
+    pub fn named(&self, theta: &[f64]) -> Vec<(String, Vec<f64>)> {
+        let functions = self.list.iter().map(CoefficientFunction::name);
+        let functions = functions.zip(self.ranges.iter().cloned());
+        let scalars = self.scalars.iter().map(|scalar| scalar.name.clone());
+        let scalars = scalars.zip(self.scalar_range().map(|i| i..i + 1));
+        let all = functions.chain(scalars);
+        all.map(|(name, range)| (name, theta[range].to_vec()))
+            .collect()
+    }
+
+    /// The start with the parameters of functions and scalars of the same name and number.
+    pub fn start_of(&self, named: &[(String, Vec<f64>)]) -> Vec<f64> {
+        let own = self.named(&self.start()).into_iter();
+        let values = own.flat_map(|(name, start)| {
+            let same = |(other, values): &&(String, Vec<f64>)| {
+                *other == name && values.len() == start.len()
+            };
+            let other = named.iter().find(same).map(|(_, values)| values.clone());
+            other.unwrap_or(start)
+        });
+        values.collect()
     }
 
     /// Sets the start.
