@@ -25,7 +25,11 @@ fn what_a_stop_leaves_out_is_named() {
     let [all, least] = [&whole, &stopped].map(|document| document.verdict.as_ref().unwrap());
     assert_eq!(all.level, VerdictLevel::Adequate);
     assert_eq!(least.level, VerdictLevel::Check);
-    let texts: Vec<&str> = least.reasons.iter().map(|reason| &*reason.sentence).collect();
+    let texts: Vec<&str> = least
+        .reasons
+        .iter()
+        .map(|reason| &*reason.sentence)
+        .collect();
     assert_eq!(
         texts,
         [

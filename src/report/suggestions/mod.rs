@@ -6,17 +6,17 @@ mod residuals;
 mod terms;
 
 use super::document::{ExperimentSummary, ResultDocument};
-use crate::config::Model;
+use crate::config::{AutomaticGrid, Model};
 use crate::escape::shell_quoted;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::assessment::{Doubt, EXACT, POOR};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::solvers::{FEW_PARAMETERS, Solver, StartStrategy, Status};
-use records::{about_disturbance, about_interpolation, about_records};
+use records::{about_disturbance, about_error, about_interpolation};
 use residuals::{about_misfit, about_patterns};
 use serde_json::json;
-use terms::{about_friction, about_terms};
+use terms::{about_term, about_width};
 
 /// Most pieces of advice.
 pub const MOST: usize = 3;
@@ -108,35 +108,29 @@ impl Suggestion {
     }
 }
 
-/// The suggestions of a document of a fit of the model, most urgent first.
+/// The suggestions of a document of a fit of the model: what ended the search, and the steps; the advice of each doubt, in the order of the reasons of the verdict, which has what is
+/// most severe first, and causes before what they leave in the residuals; then what the residuals and the estimates ask for without a doubt.
 pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> {
-    let mut steps = Vec::new();
     if let Some(codes) = about_codes(model) {
         // They spoil all else.
         return vec![codes];
     }
-    steps.extend(about_ending(document));
-    steps.extend(about_steps(document, model));
-    steps.extend(about_records(document, model));
-    steps.extend(about_means(document));
-    steps.extend(about_terms(document));
-    steps.extend(about_friction(document));
-    steps.extend(about_disturbance(document, model));
-    steps.extend(about_interpolation(document));
-    if has(document, |doubt| matches!(doubt, Doubt::TimeOrAmplitude(_))) {
-        steps.push(Suggestion::outside(
-            "second_amplitude",
-            "measure a record at a second amplitude (half or twice) and fit both: it shows whether the coefficients depend on time or on amplitude",
-        ));
-    }
-    steps.extend(about_patterns(document));
-    steps.extend(about_misfit(document, model));
-    steps.extend(about_constants(document));
-    steps.extend(about_rank(document));
+    let of_doubts = document.doubts();
+    let of_doubts = of_doubts.filter_map(|doubt| about_doubt(doubt, document, model));
+    let steps = (about_ending(document).into_iter())
+        .chain(about_steps(document, model))
+        .chain(of_doubts)
+        .chain(about_patterns(document))
+        .chain(about_misfit(document, model))
+        .chain(about_constants(document))
+        .chain(about_rank(document));
     let mut in_file: Vec<Suggestion> = Vec::new();
-    for step in steps.into_iter().map(|step| step.in_file(&model.positions)) {
+    for step in steps.map(|step| step.in_file(&model.positions)) {
         // Several findings may ask for one change.
-        let is_new = |known: &Suggestion| known.step != step.step || step.step == Step::Outside;
+        let is_new = |known: &Suggestion| match step.step {
+            Step::Outside => *known != step,
+            _ => known.step != step.step,
+        };
         if in_file.iter().all(is_new) {
             in_file.push(step);
         }
@@ -144,9 +138,44 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     in_file
 }
 
-/// True if the fit has such a doubt.
-fn has(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> bool {
-    document.doubts().any(is_meant)
+/// The advice of a doubt.
+fn about_doubt(doubt: &Doubt, document: &ResultDocument, model: &Model) -> Option<Suggestion> {
+    match doubt {
+        Doubt::RecordError(error) => about_error(error, document, model),
+        Doubt::MissingTerm(missing) => Some(about_term(missing)),
+        Doubt::FrictionWidth {
+            width,
+            better,
+            errors,
+            ..
+        } => Some(about_width(*width, *better, *errors)),
+        Doubt::DisturbedInput {
+            experiment,
+            input,
+            sigma,
+            ..
+        } => about_disturbance(document, model, experiment, input.name(), *sigma),
+        Doubt::InterpolationLoss {
+            experiment, input, ..
+        } => about_interpolation(document, experiment, *input),
+        Doubt::ResidualMean {
+            experiment,
+            channel,
+            ..
+        } => {
+            let i = position(document, experiment)?;
+            Some(Suggestion::change(
+                "estimate_offset",
+                format!("{channel} of {experiment}: estimate the offset of the sensor"),
+                vec![format!("experiments.{i}.sensors.{channel}.offset=estimate")],
+            ))
+        }
+        Doubt::TimeOrAmplitude(_) => Some(Suggestion::outside(
+            "second_amplitude",
+            "measure a record at a second amplitude (half or twice) and fit both: it shows whether the coefficients depend on time or on amplitude",
+        )),
+        _ => None,
+    }
 }
 
 /// The suggestions as advice without trials, where the model file is not at hand.
@@ -251,16 +280,16 @@ fn about_steps(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
         false => half.change_per_residual,
     };
     // A coefficient that varies within a period is rough on every grid.
-    let is_fast = has(document, |doubt| {
-        matches!(doubt, Doubt::FastVariation { .. })
-    });
+    let is_fast = document
+        .doubts()
+        .any(|doubt| matches!(doubt, Doubt::FastVariation { .. }));
     if is_fast || half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
     let summary = &document.model;
     let refines = [Solver::GaussNewton, Solver::ProjectedGradient];
     let is_refined = refines.iter().any(|solver| summary.method == solver.name());
-    let is_chosen = model.grid.is_some();
+    let is_chosen = model.grid.as_ref().is_some_and(AutomaticGrid::is_chosen);
     // The steps of a chosen grid are not why a model does not fit.
     if is_chosen && document.worst_fit().is_some_and(is_poor) {
         return None;
@@ -274,26 +303,6 @@ fn about_steps(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
         "finer_steps",
         "the time step is too coarse: use more nodes",
         vec![format!("grid.nodes={nodes}")],
-    ))
-}
-
-/// The sensor with the most significant mean of its residuals.
-fn about_means(document: &ResultDocument) -> Option<Suggestion> {
-    let means = document.doubts().filter_map(|doubt| match doubt {
-        Doubt::ResidualMean {
-            experiment,
-            channel,
-            t,
-            ..
-        } => Some((t.abs(), channel, experiment)),
-        _ => None,
-    });
-    let (_, channel, experiment) = means.max_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
-    let i = position(document, experiment)?;
-    Some(Suggestion::change(
-        "estimate_offset",
-        format!("{channel} of {experiment}: estimate the offset of the sensor"),
-        vec![format!("experiments.{i}.sensors.{channel}.offset=estimate")],
     ))
 }
 
@@ -336,9 +345,10 @@ fn about_rank(document: &ResultDocument) -> Option<Suggestion> {
 
 /// True where the fit leaves residuals that no noise explains.
 pub(super) fn is_unexplained(document: &ResultDocument) -> bool {
-    has(document, |doubt| {
-        matches!(doubt, Doubt::PoorFit { .. } | Doubt::Coloured { .. })
-    }) && document.worst_fit().is_some_and(|worst| worst < EXACT)
+    document
+        .doubts()
+        .any(|doubt| matches!(doubt, Doubt::PoorFit { .. } | Doubt::Coloured { .. }))
+        && document.worst_fit().is_some_and(|worst| worst < EXACT)
 }
 
 /// True for a fit below [`POOR`].
