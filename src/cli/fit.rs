@@ -146,7 +146,7 @@ pub(super) fn read(file: &ModelFile) -> Result<Model, InputError> {
 
 /// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.
 pub(super) fn code(document: &ResultDocument, printed: &Printed) -> u8 {
-    let mut reasons = document.reasons();
+    let mut reasons = document.doubts();
     let by_end = match reasons.any(|reason| matches!(reason, Doubt::Stopped { .. })) {
         true => interrupt::exit_code(),
         false => exit_code(document.outcome.status),

@@ -167,7 +167,7 @@ fn status(document: &ResultDocument, estimate: &Estimate) -> String {
 fn is_not_unique(document: &ResultDocument, estimate: &Estimate) -> bool {
     let is_deficient = |doubt: &Doubt| matches!(doubt, Doubt::RankDeficient { .. });
     let is_estimated = estimate.status != EstimateStatus::Fixed && estimate.ci95.is_none();
-    is_estimated && document.cost.regularisation == 0.0 && document.reasons().any(is_deficient)
+    is_estimated && document.cost.regularisation == 0.0 && document.doubts().any(is_deficient)
 }
 
 /// Name of the fixed function that determines the scale of all others.

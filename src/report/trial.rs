@@ -4,7 +4,7 @@
 //! iterations of the fit and those that take the time of its assessment, counted at the nodes of its grid; what does not fit into these is
 //! *not tried*. The number of iterations, not the time, is the limit: the same input gives the same advice on every machine.
 
-use super::document::ResultDocument;
+use super::document::{ResultDocument, level_in_words};
 use super::fit_assessment::RunAssessment;
 use super::run::{FittedModel, RequestedFiles};
 use super::suggestions::{MOST, Step, is_unexplained, suggestions};
@@ -188,20 +188,15 @@ fn tried(
     match (level_before, gain) {
         (Some(before), _) if level < before => {
             let steps = before as u8 - level as u8;
-            Outcome::Better(Gain(steps, gain.unwrap_or(0.0)), words(level).to_owned())
+            Outcome::Better(
+                Gain(steps, gain.unwrap_or(0.0)),
+                level_in_words(level).to_owned(),
+            )
         }
         (Some(before), Some(gain)) if level == before && gain > BETTER => {
             Outcome::Better(Gain(0, gain), format!("BIC {} lower", significant(gain, 2)))
         }
         _ => Outcome::Worse,
-    }
-}
-
-fn words(level: VerdictLevel) -> &'static str {
-    match level {
-        VerdictLevel::Adequate => "Adequate",
-        VerdictLevel::Check => "Check",
-        VerdictLevel::Inadequate => "Inadequate",
     }
 }
 

@@ -61,7 +61,8 @@ pub(super) fn build(
     let (nodes, finer) = match stated {
         Some(nodes) => (nodes, None),
         None => {
-            let finer = FinerNodes::of(records, duration, MOST_CHOSEN, sampling, asked.is_some());
+            let mut finer =
+                FinerNodes::of(records, duration, MOST_CHOSEN, sampling, asked.is_some());
             let mut choice = Vec::new();
             let first = auto::nodes(
                 method(file),
@@ -72,7 +73,8 @@ pub(super) fn build(
                 &mut choice,
             );
             // One node per sample needs no explanation.
-            if sampling != Some(first) {
+            finer.is_per_sample = sampling == Some(first);
+            if !finer.is_per_sample {
                 notes.append(&mut choice);
             }
             (finer.at_least(least.max(first)), Some(finer))

@@ -38,6 +38,11 @@ impl AutomaticGrid {
     pub fn most(&self) -> usize {
         self.finer.most
     }
+
+    /// True for steps that the record determines, not its sampling.
+    pub fn is_chosen(&self) -> bool {
+        !self.finer.is_per_sample
+    }
 }
 
 impl Model {

@@ -336,24 +336,18 @@ impl ResultDocument {
 
     /// True where the fit or the data show two modes.
     pub(super) fn has_two_modes(&self) -> bool {
-        self.reasons().any(|reason| match reason {
+        self.doubts().any(|doubt| match doubt {
             Doubt::SecondMode { .. } => true,
             Doubt::Preferred { candidates } => candidates.iter().any(Candidate::has_second_mode),
             _ => false,
         })
     }
 
-    /// The doubts among the findings of a fit of this process; a file has their sentences alone.
-    pub(super) fn doubts(&self) -> impl Iterator<Item = &Doubt> {
-        self.findings
-            .iter()
-            .filter_map(|finding| finding.doubt.as_ref())
-    }
-
-    /// The doubts among the reasons of the verdict, as [`ResultDocument::doubts`].
-    pub(crate) fn reasons(&self) -> impl Iterator<Item = &Doubt> {
+    /// The doubts about a fit of this process, the reasons of the verdict before all findings; a file has their sentences alone.
+    pub(crate) fn doubts(&self) -> impl Iterator<Item = &Doubt> {
         let reasons = self.verdict.iter().flat_map(|verdict| &verdict.reasons);
-        reasons.filter_map(|reason| reason.doubt.as_ref())
+        let all = reasons.chain(&self.findings);
+        all.filter_map(|finding| finding.doubt.as_ref())
     }
 
     /// True if a previous fit estimated the standard deviation of a channel, which changes the cost of the last one.

@@ -3,28 +3,27 @@
 use super::{Step, Suggestion, written};
 use crate::config::Model;
 use crate::report::document::ResultDocument;
-use kmcfit_core::assessment::{Doubt, RecordParameter};
+use kmcfit_core::assessment::RecordParameter;
 use kmcfit_core::candidates::{Addition, Candidate};
 use kmcfit_core::system::InputQuantity;
 
-/// Suggestions about the candidates of a fit: the changes of the model by the best ones, and a measurement that would tell them apart.
-pub(super) fn about_candidates(document: &ResultDocument, model: &Model) -> Vec<Suggestion> {
-    let mut found = Vec::new();
-    for doubt in document.doubts() {
-        let (candidates, is_preferred) = match doubt {
-            Doubt::Preferred { candidates } => (candidates, true),
-            Doubt::AsGood { candidates } => (candidates, false),
-            _ => continue,
-        };
-        let changes = candidates.iter().filter(|_| is_preferred);
-        found.extend(changes.filter_map(|candidate| {
-            let overrides = overrides(candidate, document, model)?;
-            let words = format!("add {}", candidate.words);
-            Some(Suggestion::change("add", words, overrides))
-        }));
-        found.extend(measurement(candidates, !is_preferred));
-    }
-    found
+/// Suggestions about candidates that are preferred to the model or as good: the changes of the model by them, and a measurement that would tell
+/// them apart.
+pub(super) fn about_candidates(
+    candidates: &[Candidate],
+    are_preferred: bool,
+    document: &ResultDocument,
+    model: &Model,
+) -> Vec<Suggestion> {
+    let changes = candidates.iter().filter(|_| are_preferred);
+    let changes = changes.filter_map(|candidate| {
+        let overrides = overrides(candidate, document, model)?;
+        let words = format!("add {}", candidate.words);
+        Some(Suggestion::change("add", words, overrides))
+    });
+    changes
+        .chain(measurement(candidates, !are_preferred))
+        .collect()
 }
 
 /// The measurement that tells candidates apart.

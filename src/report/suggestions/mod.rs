@@ -7,7 +7,7 @@ mod residuals;
 mod terms;
 
 use super::document::{ExperimentSummary, ResultDocument};
-use crate::config::Model;
+use crate::config::{AutomaticGrid, Model};
 use crate::escape::shell_quoted;
 use crate::finding::Finding;
 use crate::number_format::significant;
@@ -17,10 +17,10 @@ use kmcfit_core::assessment::{Doubt, EXACT, POOR};
 use kmcfit_core::diagnostics::SIGNIFICANCE;
 use kmcfit_core::problem::FEW_PARAMETERS;
 use kmcfit_core::solvers::{Solver, StartStrategy, Status};
-use records::{about_disturbance, about_interpolation, about_records};
+use records::{about_disturbance, about_error, about_interpolation};
 use residuals::{about_misfit, about_patterns};
 use serde_json::json;
-use terms::{about_friction, about_terms};
+use terms::{about_term, about_width};
 
 /// Most pieces of advice.
 pub const MOST: usize = 3;
@@ -112,29 +112,32 @@ impl Suggestion {
     }
 }
 
-/// The suggestions of a document of a fit of the model, most urgent first.
+/// The suggestions of a document of a fit of the model: what ended the search, and the steps; the advice of each doubt, in the order of the reasons of the verdict, which has what is
+/// most severe first, and causes before what they leave in the residuals; then what the residuals and the estimates ask for without a doubt.
 pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> {
-    let mut steps = Vec::new();
     if let Some(codes) = about_codes(model) {
         // They spoil all else.
         return vec![codes];
     }
-    steps.extend(about_ending(document));
-    steps.extend(about_steps(document, model));
-    steps.extend(about_records(document, model));
-    steps.extend(about_terms(document));
-    steps.extend(about_friction(document));
-    steps.extend(about_disturbance(document, model));
-    steps.extend(about_interpolation(document));
-    steps.extend(about_candidates(document, model));
-    steps.extend(about_patterns(document));
-    steps.extend(about_misfit(document, model));
-    steps.extend(about_constants(document));
-    steps.extend(about_rank(document));
+    let of_doubts = document.doubts().flat_map(|doubt| match doubt {
+        Doubt::Preferred { candidates } => about_candidates(candidates, true, document, model),
+        Doubt::AsGood { candidates } => about_candidates(candidates, false, document, model),
+        _ => about_doubt(doubt, document, model).into_iter().collect(),
+    });
+    let steps = (about_ending(document).into_iter())
+        .chain(about_steps(document, model))
+        .chain(of_doubts)
+        .chain(about_patterns(document))
+        .chain(about_misfit(document, model))
+        .chain(about_constants(document))
+        .chain(about_rank(document));
     let mut in_file: Vec<Suggestion> = Vec::new();
-    for step in steps.into_iter().map(|step| step.in_file(&model.positions)) {
+    for step in steps.map(|step| step.in_file(&model.positions)) {
         // Several findings may ask for one change.
-        let is_new = |known: &Suggestion| known.step != step.step || step.step == Step::Outside;
+        let is_new = |known: &Suggestion| match step.step {
+            Step::Outside => *known != step,
+            _ => known.step != step.step,
+        };
         if in_file.iter().all(is_new) {
             in_file.push(step);
         }
@@ -142,9 +145,28 @@ pub fn suggestions(document: &ResultDocument, model: &Model) -> Vec<Suggestion> 
     in_file
 }
 
-/// True if the fit has such a doubt.
-fn has(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> bool {
-    document.doubts().any(is_meant)
+/// The advice of a doubt.
+fn about_doubt(doubt: &Doubt, document: &ResultDocument, model: &Model) -> Option<Suggestion> {
+    match doubt {
+        Doubt::RecordError(error) => about_error(error, document, model),
+        Doubt::MissingTerm(missing) => Some(about_term(missing)),
+        Doubt::FrictionWidth {
+            width,
+            better,
+            errors,
+            ..
+        } => Some(about_width(*width, *better, *errors)),
+        Doubt::DisturbedInput {
+            experiment,
+            input,
+            sigma,
+            ..
+        } => about_disturbance(document, model, experiment, input.name(), *sigma),
+        Doubt::InterpolationLoss {
+            experiment, input, ..
+        } => about_interpolation(document, experiment, *input),
+        _ => None,
+    }
 }
 
 /// The suggestions as advice without trials, where the model file is not at hand.
@@ -249,16 +271,16 @@ fn about_steps(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
         false => half.change_per_residual,
     };
     // A coefficient that varies within a period is rough on every grid.
-    let is_fast = has(document, |doubt| {
-        matches!(doubt, Doubt::FastVariation { .. })
-    });
+    let is_fast = document
+        .doubts()
+        .any(|doubt| matches!(doubt, Doubt::FastVariation { .. }));
     if is_fast || half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
     let summary = &document.model;
     let refines = [Solver::GaussNewton, Solver::ProjectedGradient];
     let is_refined = refines.iter().any(|solver| summary.method == solver.name());
-    let is_chosen = model.grid.is_some();
+    let is_chosen = model.grid.as_ref().is_some_and(AutomaticGrid::is_chosen);
     // The steps of a chosen grid are not why a model does not fit.
     if is_chosen && document.worst_fit().is_some_and(is_poor) {
         return None;
@@ -314,9 +336,10 @@ fn about_rank(document: &ResultDocument) -> Option<Suggestion> {
 
 /// True where the fit leaves residuals that no noise explains.
 pub(super) fn is_unexplained(document: &ResultDocument) -> bool {
-    has(document, |doubt| {
-        matches!(doubt, Doubt::PoorFit { .. } | Doubt::Coloured { .. })
-    }) && document.worst_fit().is_some_and(|worst| worst < EXACT)
+    document
+        .doubts()
+        .any(|doubt| matches!(doubt, Doubt::PoorFit { .. } | Doubt::Coloured { .. }))
+        && document.worst_fit().is_some_and(|worst| worst < EXACT)
 }
 
 /// True for a fit below [`POOR`].

@@ -36,19 +36,21 @@ fn sampled_input(model: &Model, i: usize) -> Option<(&'static str, &Signal)> {
 }
 
 /// Correction of an error of a record.
-pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
-    let errors = document.doubts().filter_map(|doubt| match doubt {
-        Doubt::RecordError(error) => Some(error),
-        _ => None,
-    });
-    errors.into_iter().find_map(|error| match error {
+pub(super) fn about_error(
+    error: &RecordError,
+    document: &ResultDocument,
+    model: &Model,
+) -> Option<Suggestion> {
+    match error {
         RecordError::ChannelFactor {
             channel, factor, ..
         } => {
             let gain = |i: usize| vec![changed_gain(model, i, channel, *factor)];
             Some(Suggestion::change(
                 "scale_channel",
-                format!("correct the unit of the {channel} or of the other channels and the input (`units`), or state the gain of its sensor"),
+                format!(
+                    "correct the unit of the {channel} or of the other channels and the input (`units`), or state the gain of its sensor"
+                ),
                 of_channel(document, channel, gain),
             ))
         }
@@ -58,7 +60,9 @@ pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<
             let gains = channels.map(|c| changed_gain(model, i, &c.kind, -1.0));
             Some(Suggestion::change(
                 "reverse_input",
-                format!("reverse the sign of the input of {experiment} in its file, or that of the response"),
+                format!(
+                    "reverse the sign of the input of {experiment} in its file, or that of the response"
+                ),
                 gains.collect(),
             ))
         }
@@ -89,7 +93,7 @@ pub(super) fn about_records(document: &ResultDocument, model: &Model) -> Option<
             ),
         )),
         RecordError::InputPulses { .. } => None,
-    })
+    }
 }
 
 /// Another interpolation of the input, or an estimated delay, for a response that lags by these samples.
@@ -126,17 +130,13 @@ fn about_delay(document: &ResultDocument, experiment: &str, samples: f64) -> Opt
 }
 
 /// Noise of the sensor of an input, with cubics where lines connect its samples, as these lose a share of it.
-pub(super) fn about_disturbance(document: &ResultDocument, model: &Model) -> Option<Suggestion> {
-    let disturbed = document.doubts().find_map(|doubt| match doubt {
-        Doubt::DisturbedInput {
-            experiment,
-            input,
-            sigma,
-            ..
-        } => Some((experiment, input.name(), *sigma)),
-        _ => None,
-    });
-    let (experiment, name, sigma) = disturbed?;
+pub(super) fn about_disturbance(
+    document: &ResultDocument,
+    model: &Model,
+    experiment: &str,
+    name: &str,
+    sigma: f64,
+) -> Option<Suggestion> {
     let is_held = |signal: &Signal| signal.interpolation() == Interpolation::Hold;
     let jump = document.doubts().find_map(|doubt| match doubt {
         Doubt::RecordError(RecordError::InputJump { experiment, .. }) => Some(experiment),
@@ -162,14 +162,11 @@ pub(super) fn about_disturbance(document: &ResultDocument, model: &Model) -> Opt
 }
 
 /// Cubic interpolation of a force, which loses less.
-pub(super) fn about_interpolation(document: &ResultDocument) -> Option<Suggestion> {
-    let loss = document.doubts().find_map(|doubt| match doubt {
-        Doubt::InterpolationLoss {
-            experiment, input, ..
-        } => Some((experiment, *input)),
-        _ => None,
-    });
-    let (experiment, input) = loss?;
+pub(super) fn about_interpolation(
+    document: &ResultDocument,
+    experiment: &str,
+    input: InputQuantity,
+) -> Option<Suggestion> {
     let input = match input {
         InputQuantity::Force => "force",
         InputQuantity::BaseAcceleration => "base",

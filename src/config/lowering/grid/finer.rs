@@ -15,6 +15,8 @@ pub struct FinerNodes {
     /// Sampling intervals in the record of samples that fall on nodes, those of force or base or those of all channels; `None`
     /// without them.
     intervals: Option<f64>,
+    /// True where the first grid has a node for each sample.
+    pub is_per_sample: bool,
 }
 
 impl FinerNodes {
@@ -34,6 +36,7 @@ impl FinerNodes {
             most: most.min(samples.saturating_mul(MOST_PER_SAMPLE[usize::from(!is_stated)])),
             intervals: (spacing.reduce(f64::min).map(|spacing| duration / spacing))
                 .or_else(|| sampling.map(|nodes| (nodes - 1) as f64)),
+            is_per_sample: false,
         }
     }
 
@@ -78,11 +81,13 @@ mod tests {
         let free = FinerNodes {
             most: 1000,
             intervals: None,
+            is_per_sample: false,
         };
         assert_eq!(free.at_least(42), 42);
         let forced = FinerNodes {
             most: 1000,
             intervals: Some(10.0),
+            is_per_sample: false,
         };
         assert_eq!(
             [11, 12, 21, 42].map(|n| forced.at_least(n)),
