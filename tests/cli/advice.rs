@@ -127,7 +127,7 @@ const CASES: &[Case] = &[
         wrong: &[("functions:", "grid: {nodes: 150}\nfunctions:")],
     },
     Case {
-        kind: "add_term",
+        kind: "add",
         system: System {
             cubic: 5e4,
             ..LINEAR
@@ -136,7 +136,7 @@ const CASES: &[Case] = &[
         wrong: &[],
     },
     Case {
-        kind: "add_term",
+        kind: "add",
         system: System {
             friction: 2.0,
             ..LINEAR
@@ -145,13 +145,13 @@ const CASES: &[Case] = &[
         wrong: &[],
     },
     Case {
-        kind: "estimate_offset",
+        kind: "add",
         system: LINEAR,
         defect: |_, [t, f, y]| [t, f, y + 2e-4],
         wrong: &[],
     },
     Case {
-        kind: "estimate_offset",
+        kind: "add",
         system: LINEAR,
         defect: |_, [t, f, y]| [t, f, y + 2e-3],
         wrong: &[],

@@ -111,8 +111,8 @@ impl Kind {
                 "errors at",
             ],
             K::ResponseQuantised | K::ForceQuantised => &["quantis"],
-            K::ResponseLate => &["lags its input"],
-            K::ResponseEarly => &["leads its input"],
+            K::ResponseLate => &["lags its input", "a delay of the response of 0."],
+            K::ResponseEarly => &["leads its input", "a delay of the response of -0."],
             K::FileCut => &["the row does not fit"],
         }
     }

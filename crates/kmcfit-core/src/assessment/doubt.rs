@@ -319,12 +319,10 @@ impl Doubt {
 
     /// True for what names the cause of other doubts.
     pub fn is_cause(&self) -> bool {
-        matches!(
-            self,
-            Self::Preferred { .. }
-                | Self::MissingTerm(_)
-                | Self::SecondMode { .. }
-                | Self::RecordError(_)
-        )
+        match self {
+            Self::Preferred { candidates } => candidates.first().is_some_and(Candidate::explains),
+            Self::MissingTerm(_) | Self::SecondMode { .. } | Self::RecordError(_) => true,
+            _ => false,
+        }
     }
 }

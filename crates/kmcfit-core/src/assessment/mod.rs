@@ -73,7 +73,7 @@ use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
 use variation::variation_warnings;
 
-use crate::candidates::{Candidate, Candidates};
+use crate::candidates::{Candidate, Candidates, GAIN};
 use crate::functions::CoefficientFunction;
 use crate::identifiability::{
     Bands, FunctionClassification, Quantities, classify_functions, condition_on_bases,
@@ -322,9 +322,11 @@ fn cause(
         let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
         Some(Doubt::RecordError(or_jump(problem, found)))
     };
-    // Residuals that are white explain all; others may be those of few samples of an input.
-    let is_white = candidates.is_some_and(Candidates::explain);
-    let (white, other) = match is_white {
+    // A clear candidate that leaves white residuals explains all; others may be few samples of an input.
+    let is_clear = candidates
+        .and_then(Candidates::preferred)
+        .is_some_and(|best| best.explains() && best.gain > 2.0 * GAIN);
+    let (white, other) = match is_clear {
         true => (preferred, None),
         false => (None, preferred),
     };

@@ -58,9 +58,7 @@ pub fn verdict_reasons(
         let is_explained = !causes.is_empty();
         reasons.extend(causes);
         let is_new = |doubt: &Doubt| match doubt {
-            Doubt::CoherentResiduals { .. }
-            | Doubt::DisturbedInput { .. }
-            | Doubt::ClassicalDisagrees(_) => !is_explained,
+            Doubt::CoherentResiduals { .. } | Doubt::DisturbedInput { .. } => !is_explained,
             _ => true,
         };
         match &plausibility.unidentified {

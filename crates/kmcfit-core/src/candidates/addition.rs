@@ -2,7 +2,7 @@
 
 use super::jump;
 use super::second_mode::Mode;
-use crate::assessment::{RecordParameter, extended, with_cubic_inputs, with_functions};
+use crate::assessment::{RecordParameter, extended, with_functions};
 use crate::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
 };
@@ -162,8 +162,8 @@ impl Addition {
             }
             Self::Record(RecordParameter::Rate(_)) => None,
             Self::Record(parameter) => with_record(problem, theta, parameter, *further.first()?),
-            Self::CubicInputs => Some((with_cubic_inputs(problem)?, theta.to_vec())),
-            Self::Disturbance { .. }
+            Self::CubicInputs
+            | Self::Disturbance { .. }
             | Self::SensorCurve { .. }
             | Self::Tone { .. }
             | Self::SecondMode { .. } => None,

@@ -3,11 +3,11 @@
 use super::Candidate;
 use super::addition::Addition;
 use super::estimates::estimates;
+use super::jump;
 use super::penalised_misfit::{Judged, Linearised};
 use super::second_mode::{Mode, ModeSamples};
 use crate::assessment::{
-    RecordColumns, Span, extended, finer_basis, record_parameters, weighted_residuals,
-    with_cubic_inputs, with_functions,
+    RecordColumns, Span, extended, finer_basis, record_parameters, with_functions,
 };
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::identifiability::Quantity;
@@ -130,9 +130,8 @@ pub(super) fn linear_candidates(
     all.extend(jumps(problem, evaluation, &span, &rest));
     all.extend(of_records(problem, evaluation));
     all.extend(second_modes(problem, evaluation, &span, &rest));
-    let cubic = with_cubic_inputs(problem).and_then(|changed| changed.evaluate(theta).ok());
     let judged = map(all.len(), analyses_at_once(problem.sample_count()), |i| {
-        linearised.with(&all[i].columns, &linearised.residuals, all[i].searched)
+        linearised.with(&all[i].columns, all[i].searched)
     });
     let judged = all
         .iter()
@@ -142,12 +141,7 @@ pub(super) fn linear_candidates(
             judged,
             parameters: column.columns.len(),
         });
-    let cubic = cubic.map(|evaluation| LinearCandidate {
-        addition: Addition::CubicInputs,
-        judged: linearised.with(&[], &weighted_residuals(problem, &evaluation), 0),
-        parameters: 0,
-    });
-    judged.chain(cubic).collect()
+    judged.collect()
 }
 
 /// Functions that are estimated without a known value, a penalty or a prior.
@@ -157,7 +151,10 @@ fn open_functions(problem: &Problem) -> impl Iterator<Item = (usize, &Coefficien
         let is_penalised = problem.penalties.iter().any(|p| p.function == *index)
             || problem.variations.iter().any(|v| v.function == *index)
             || problem.jumps.iter().any(|j| j.function == *index);
-        function.basis.is_some() && !is_penalised && function.prior.is_none()
+        let grid = &problem.system.grid;
+        let basis = function.basis.as_ref();
+        let is_open = basis.is_some_and(|basis| !jump::is_jump(grid, basis));
+        is_open && !is_penalised && function.prior.is_none()
     })
 }
 
@@ -170,13 +167,7 @@ fn of_structure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Op
         own.any(|own| own == kind)
     };
     let width = width(evaluation)?;
-    // The next power.
-    let is_next = |kind: CoefficientKind| {
-        kind != CoefficientKind::QUINTIC_STIFFNESS || has(CoefficientKind::CUBIC_STIFFNESS)
-    };
-    let terms = TERMS
-        .into_iter()
-        .filter(|kind| !has(*kind) && is_next(*kind));
+    let terms = TERMS.into_iter().filter(|kind| !has(*kind));
     let terms: Vec<(CoefficientKind, Law)> =
         terms.filter_map(|k| Some((k, k.law(width)?))).collect();
     let nodes = problem.functions.nodes();

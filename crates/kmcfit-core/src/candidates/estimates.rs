@@ -3,9 +3,10 @@
 use super::addition::Addition;
 use super::penalised_misfit::Judged;
 use crate::assessment::RecordParameter;
+use crate::functions::Ratio;
 use crate::identifiability::Quantity;
 use crate::problem::Problem;
-use nalgebra::DMatrix;
+use crate::signal::median;
 
 /// The estimates of an addition to a problem, whose fit has the parameters `theta`; `held` are those that were searched.
 pub(super) fn estimates(
@@ -92,19 +93,28 @@ pub(super) fn estimates(
         }
         Addition::SecondMode { mode, .. } => {
             let [f, ratio] = mode;
-            vec![
+            let mut modes = vec![
                 of("frequency", "Hz", f, vec![(last - 1, f)]),
                 of("damping ratio", "", ratio, vec![(last, ratio)]),
-            ]
+            ];
+            let nodal = problem.functions.nodal(&theta[..problem.parameters()]);
+            let own = [Ratio::NaturalFrequency, Ratio::DampingRatio];
+            let own = own.map(|r| median(r.at_nodes(problem.system.laws(), &nodal)));
+            let own = [
+                ("own frequency", "Hz", own[0]),
+                ("own damping ratio", "", own[1]),
+            ];
+            modes.extend(own.map(|(name, unit, value)| Quantity::new(name, unit, value)));
+            modes
         }
     };
-    let known = |quantity: Quantity, covariance: &DMatrix<f64>| {
-        quantity.with_covariance(covariance, judged.degrees)
+    // A rate of clocks is found by a search of its own.
+    let rows = judged.covariance.nrows();
+    let known = |quantity: Quantity| match quantity.gradient.iter().all(|(i, _)| *i < rows) {
+        true => quantity.with_covariance(&judged.covariance, judged.degrees),
+        false => quantity,
     };
-    quantities
-        .into_iter()
-        .map(|q| known(q, &judged.covariance))
-        .collect()
+    quantities.into_iter().map(known).collect()
 }
 
 fn unit_of(problem: &Problem, e: usize, c: usize) -> String {

@@ -38,6 +38,17 @@ pub(super) fn basis(grid: &Grid, time: f64) -> Option<Basis> {
     (knots.is_sorted_by(|a, b| a < b)).then_some(Basis::PiecewiseConstant { knots })
 }
 
+/// True for the basis of a jump.
+pub(super) fn is_jump(grid: &Grid, basis: &Basis) -> bool {
+    match basis {
+        Basis::PiecewiseConstant { knots } => match knots.as_slice() {
+            [_, a, b, _] => b - a < 1.5 * grid.step(),
+            _ => false,
+        },
+        _ => false,
+    }
+}
+
 /// Refit with a jump that begins at `time`, with this change; where it leaves residuals far from white also from where the response leaves that
 /// of the beginning.
 pub(super) fn refit(
@@ -58,15 +69,14 @@ pub(super) fn refit(
         let quarter = early::of_first_quarter(problem, theta)?;
         let time = departure(problem, &quarter)?;
         let level = quarter[problem.functions.ranges()[function].start];
+        let addition = Addition::Jump { function, time };
         let each = CHANGES.into_iter().filter_map(|share| {
-            let addition = Addition::Jump { function, time };
-            plain(problem, &quarter, addition, &[share * level])
+            let change = share * level;
+            let (changed, start) = addition.added(problem, &quarter, &[change])?;
+            Some((changed.evaluate(&start).ok()?.cost, change))
         });
-        let best = each.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))?;
-        let first = problem.functions.ranges()[function].start;
-        let start = [&best.theta[..=first], &best.theta[first + 3..]].concat();
-        let change = best.theta[first + 2] - best.theta[first];
-        from(problem, &start, function, time, change)
+        let (_, change) = each.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        from(problem, &quarter, function, time, change)
     };
     let both = best.into_iter().chain(from_beginning());
     both.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))

@@ -21,7 +21,7 @@ mod words;
 
 pub use addition::Addition;
 
-use crate::assessment::{Disturbance, Refit, applies, uncorrelated};
+use crate::assessment::{Disturbance, Refit, applies, uncorrelated, with_cubic_inputs};
 use crate::identifiability::Quantity;
 use crate::number_format::number_or_nan;
 use crate::objective::Evaluation;
@@ -69,6 +69,11 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// True where it leaves residuals that are close to white.
+    pub fn explains(&self) -> bool {
+        self.order < COLOURED
+    }
+
     /// True for a second mode.
     pub fn has_second_mode(&self) -> bool {
         let mut additions = self.additions.iter();
@@ -108,6 +113,13 @@ impl Candidates {
         };
         let evaluation = white.evaluate(&theta).ok()?;
         applies(&white, &theta, &evaluation).then_some(())?;
+        // What lines between the samples of an input lose looks like other candidates, which are then judged beside splines.
+        if let Some((splines, candidate)) = with_splines(&white, &theta, &evaluation) {
+            let mut found = Self::at(&splines.problem, &splines.fit.best.parameters, None)?;
+            found.list.push(candidate);
+            found.list.sort_by(best_first);
+            return Some(found);
+        }
         let mut own = Self::at(&white, &theta, None)?;
         if let Some(constants) = constants::of(&white, &theta, &evaluation) {
             own.list.extend(constants);
@@ -158,11 +170,6 @@ impl Candidates {
         self.list.first().filter(|best| best.gain >= GAIN)
     }
 
-    /// True if the residuals of the candidate that is preferred are close to white.
-    pub(crate) fn explain(&self) -> bool {
-        self.preferred().is_some_and(|best| best.order < COLOURED)
-    }
-
     /// Functions that may vary more than those of the model.
     pub fn varying(&self) -> Vec<usize> {
         let of_ties = self.preferred().map_or(&[][..], |_| self.ties());
@@ -195,6 +202,32 @@ impl Candidates {
             .count();
         &self.list[..count]
     }
+}
+
+/// The refit with cubic splines in place of lines between the samples of the inputs, and this candidate; `None` where it is no better.
+fn with_splines(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<(Refit, Candidate)> {
+    let splines = Refit::of(with_cubic_inputs(problem)?, theta)?;
+    let own = Linearised::at(problem, evaluation).own();
+    let found = Linearised::at(&splines.problem, splines.evaluation()).own();
+    let gain = own.misfit - found.misfit;
+    let addition = Addition::CubicInputs;
+    let candidate = Candidate {
+        name: addition.name(problem),
+        words: addition.words(problem, &[]),
+        additions: vec![addition],
+        to_constants: false,
+        gain,
+        parameters: 0,
+        order: found.order,
+        is_refitted: true,
+        estimates: Vec::new(),
+        parameters_by_name: Vec::new(),
+    };
+    (gain > 0.0).then_some((splines, candidate))
 }
 
 /// Disturbances of the inputs of a problem with white noise, in place of the processes of the residuals.

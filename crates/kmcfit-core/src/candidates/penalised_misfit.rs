@@ -94,17 +94,12 @@ impl Linearised {
 
     /// The model itself.
     pub(super) fn own(&self) -> Judged {
-        self.with(&[], &self.residuals, 0)
+        self.with(&[], 0)
     }
 
-    /// The model with further derivatives of the residuals, and `searched` parameters that were searched; `residuals` are those of the model,
-    /// or of the model with another input.
-    pub(super) fn with(
-        &self,
-        further: &[DVector<f64>],
-        residuals: &DVector<f64>,
-        searched: usize,
-    ) -> Judged {
+    /// The model with further derivatives of the residuals, and `searched` parameters that were searched.
+    pub(super) fn with(&self, further: &[DVector<f64>], searched: usize) -> Judged {
+        let residuals = &self.residuals;
         let own = self.jacobian.column_iter().map(|c| c.into_owned());
         let columns: Vec<DVector<f64>> = own.chain(further.iter().cloned()).collect();
         let columns = DMatrix::from_columns(&columns);

@@ -404,7 +404,7 @@ fn beside(
                 own.push((sum(&further(moved)?) - &here) / SMALL);
             }
         }
-        let judged = linearised.with(&own, &linearised.residuals, 0);
+        let judged = linearised.with(&own, 0);
         let squares = judged.squares;
         if !squares.is_finite() || squares > before {
             break;

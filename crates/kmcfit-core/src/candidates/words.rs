@@ -85,7 +85,7 @@ impl Addition {
                 RecordParameter::Rate(_) => {
                     let value = estimates.first().map_or(f64::NAN, |q| 100.0 * q.value);
                     let value = significant(value, 2);
-                    format!("clocks of input and response that differ by {value} %")
+                    format!("a difference of {value} % between the clocks of input and response")
                 }
                 RecordParameter::Gain(e, c) => {
                     format!("a gain of the {}{}", channel(problem, e, c), of(0))
