@@ -45,5 +45,4 @@ pub mod units;
 
 pub use analysis::{Analysis, analyse};
 pub use kmcfit_core::finding;
-use kmcfit_core::number_format;
 pub use report::Run;

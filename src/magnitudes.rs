@@ -9,9 +9,9 @@
 //! which for mechanical vibrations lie within known ranges. A wrong unit of time or of the samples leads out of them; the reading that leads
 //! back with the fewest changes is named.
 
-use crate::number_format::significant;
 use crate::units::{Measurand, Unit};
 use kmcfit_core::assessment::Implausible;
+use kmcfit_core::number_format::significant;
 use kmcfit_core::signal::{Spectrum, median};
 use std::f64::consts::{PI, TAU};
 

@@ -1,7 +1,7 @@
 //! One bound on the memory of a command: a failed allocation would abort the program.
 
 use crate::error::InputError;
-use crate::number_format::significant;
+use kmcfit_core::number_format::significant;
 use std::path::Path;
 
 /// Most memory that a file may expand to, bytes. A table of the longest text, 4 GB, takes about as much.

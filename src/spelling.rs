@@ -1,6 +1,6 @@
 //! Suggestions for unknown words, by edit distance to the known ones.
 
-use crate::number_format::significant;
+use kmcfit_core::number_format::significant;
 
 /// Longest word that is compared; longer ones are no slip of the finger.
 const LONGEST_WORD: usize = 64;

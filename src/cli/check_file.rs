@@ -5,9 +5,9 @@ use super::{OK, print};
 use crate::config::{rate, recognised};
 use crate::error::InputError;
 use crate::escape::shell_quoted;
-use crate::number_format::significant;
 use crate::report::text::aligned;
 use crate::tables::{Table, TableFormat};
+use kmcfit_core::number_format::significant;
 use std::path::Path;
 
 /// Lists a data file.

@@ -5,10 +5,10 @@ use super::records::RecordList;
 use super::statistics::{Distribution, FEWEST, OUTLYING};
 use super::trend::Trend;
 use crate::error::InputError;
-use crate::number_format::{count, significant};
 use crate::report::page as shell;
 use crate::report::text::aligned;
 use crate::report::{Axis, Colour, Figure, Mark, Panel, Style, quantity};
+use kmcfit_core::number_format::{count, significant};
 
 /// Most records in the terminal.
 const MOST_LISTED: usize = 5;

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 
 use super::names::{factor_of_time, letters};
 use super::{FileChannel, Sampling, last_part};
-use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::units::Measurand;
+use kmcfit_core::number_format::significant;
 
 /// Deviation from whole steps by the rounding of times.
 const ALIGNED: f64 = 1e-5;

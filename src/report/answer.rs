@@ -3,9 +3,9 @@
 use super::document::ResultDocument;
 use super::ratios;
 use super::text::aligned_to;
-use crate::number_format::{resolved, significant};
 use kmcfit_core::assessment::{Doubt, Estimate, EstimateStatus};
 use kmcfit_core::identifiability::ClassificationKind;
+use kmcfit_core::number_format::{resolved, significant};
 use kmcfit_core::structure::CoefficientKind;
 use std::fmt;
 

@@ -6,12 +6,12 @@ use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
 use crate::finding::Finding;
-use crate::number_format::resolved;
 use kmcfit_core::assessment::{Doubt, FunctionSummary, function_summaries};
 use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{
     Classification, FunctionClassification, Target, structural_rank,
 };
+use kmcfit_core::number_format::resolved;
 use kmcfit_core::problem::Jumps;
 use kmcfit_core::structure::CoefficientKind;
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Residual of the equation of motion beside its forces, in words.
 
 use super::answer::in_words;
-use crate::number_format::significant;
+use kmcfit_core::number_format::significant;
 use kmcfit_core::solvers::{EquationBalance, EquationForm};
 
 /// The residual and its share of each force, the largest force first; per unit of an unknown mass they are accelerations.

@@ -1,8 +1,8 @@
 //! Extent of the records of a fit, and the result of its validation, in words.
 
 use super::document::ResultDocument;
-use crate::number_format::{count, percent, significant};
 use kmcfit_core::assessment::POOR;
+use kmcfit_core::number_format::{count, percent, significant};
 
 /// Number of samples, of several records with their number, and duration, of several records the longest; samples for validation apart.
 pub(super) fn extent(document: &ResultDocument) -> String {

@@ -1,8 +1,8 @@
 //! The standard figures of a fit, from plain slices.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use crate::number_format::at_most;
 use kmcfit_core::functions::{Ratio, WeightRule};
+use kmcfit_core::number_format::at_most;
 use kmcfit_core::signal::{even_spacing, median};
 use kmcfit_core::solvers::{PathPoint, WeightPath};
 use kmcfit_core::study::PredictedResponse;

@@ -3,11 +3,11 @@
 use super::findings;
 use crate::config::{ChannelNote, Model};
 use crate::finding::Finding;
-use crate::number_format::significant;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::standard_deviation;
 use kmcfit_core::functions::{CoefficientFunction, Ratio};
 use kmcfit_core::identifiability::{ScalingAmbiguity, Sensitivity, structural_rank};
+use kmcfit_core::number_format::significant;
 use kmcfit_core::objective::Evaluation;
 use kmcfit_core::problem::FEW_PARAMETERS;
 use kmcfit_core::record::{Channel, Experiment};

@@ -1,8 +1,8 @@
 //! Figures of one record: residual tests, spectra, frequency response and input.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use crate::number_format::count;
 use kmcfit_core::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
+use kmcfit_core::number_format::count;
 use kmcfit_core::signal::{Mobility, Spectrum};
 
 /// Coherence below which a measured frequency response is noise and does not widen its axis.

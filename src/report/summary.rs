@@ -6,11 +6,11 @@ use super::equation::equation_residual;
 use super::extent::{extent, validation};
 use super::rule_names::rule_in_words;
 use crate::finding::Finding;
-use crate::number_format::{count, percent, resolved, significant};
 use kmcfit_core::assessment::{ClassicalEstimate, Doubt};
 use kmcfit_core::finding::Severity;
 use kmcfit_core::functions::WeightRule;
 use kmcfit_core::identifiability::Quantity;
+use kmcfit_core::number_format::{count, percent, resolved, significant};
 use std::fmt::Write;
 
 /// Width of the interval of a classical frequency, relative to it, beyond which it is not shown.

@@ -4,7 +4,7 @@ use super::columns::{interval_columns, named_column};
 use super::document::ResultDocument;
 use super::result_table::ResultTable;
 use crate::error::InputError;
-use crate::number_format::significant;
+use kmcfit_core::number_format::significant;
 use std::path::Path;
 
 /// Columns for the numbers beside a chart.

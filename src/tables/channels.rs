@@ -9,10 +9,10 @@ use super::{ColumnName, Table, TableFormat, field};
 use crate::error::{InputError, Location};
 use crate::formats::{self, Channels, FileChannel, Format, Sampling, Unusable, last_part};
 use crate::memory;
-use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
 use crate::units::Measurand;
+use kmcfit_core::number_format::significant;
 
 /// Names of the column of times that is made from a sampling rate or interval; the second where a channel has the first.
 const TIME: [&str; 2] = ["time", "sampling time"];

@@ -14,10 +14,10 @@ use super::table_memory::TableMemory;
 use crate::clock::Clock;
 use crate::error::{InputError, Location};
 use crate::formats::{Meaning, meaning};
-use crate::number_format::count;
 use crate::quantity_names::quantity_of;
 use crate::text_io::{listed, quote};
 use crate::units::{Measurand, Unit};
+use kmcfit_core::number_format::count;
 use kmcfit_core::threads::both;
 
 /// Most columns: each takes some hundred bytes beside its fields.

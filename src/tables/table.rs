@@ -12,9 +12,9 @@ use super::table_memory::TableMemory;
 use crate::clock::DAY;
 use crate::error::{InputError, Location};
 use crate::formats;
-use crate::number_format::significant;
 use crate::text_io::{LONGEST_TABLE, check_lines, read_bytes, read_bytes_from};
 use crate::units::{Measurand, Unit};
+use kmcfit_core::number_format::significant;
 
 /// Span of dates above which day and month may be exchanged, s.
 const WEEKS: f64 = 20.0 * DAY;

@@ -5,10 +5,10 @@ use super::detect::DELIMITERS;
 use super::origin::ColumnValues;
 use crate::formats::{FileChannel, align, own_times};
 use crate::headings::split_unit;
-use crate::number_format::significant;
 use crate::quantity_names::quantity_of;
 use crate::text_io::quote;
 use crate::units::{Measurand, Unit};
+use kmcfit_core::number_format::significant;
 use kmcfit_core::signal::median;
 
 /// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.

@@ -12,8 +12,8 @@ use crate::config::ModelFile;
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory::MOST_NODES_TIMES_PARAMETERS;
-use crate::number_format::significant;
 use kmcfit_core::model::{BasisName, FitMethod, KnotSpec, Nodes};
+use kmcfit_core::number_format::significant;
 use kmcfit_core::problem::FEW_PARAMETERS;
 use kmcfit_core::system::{Grid, Method};
 

@@ -11,11 +11,11 @@ mod statements;
 
 use crate::error::InputError;
 use crate::memory;
-use crate::number_format::{count, significant};
 use crate::tables::{self, Table, TableFormat};
 use crate::text_io::{listed, quote};
 pub(super) use columns::ColumnAssignment;
 pub use columns::{rate, recognised};
+use kmcfit_core::number_format::{count, significant};
 use record_summary::RecordSummary;
 pub use roles::Role;
 use sensors::sensors;

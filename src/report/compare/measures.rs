@@ -2,9 +2,9 @@
 
 use super::ComparedRun;
 use super::likelihood::Likelihood;
-use crate::number_format::{resolved, significant};
 use crate::report::document::level_in_words;
 use kmcfit_core::assessment::{Estimate, TruthErrors, VerdictLevel};
+use kmcfit_core::number_format::{resolved, significant};
 use kmcfit_core::solvers::Status;
 use serde::Serialize;
 

@@ -18,7 +18,7 @@ use crate::report::timings::TimingsSummary;
 use kmcfit_core::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, StepCheck,
 };
-use kmcfit_core::candidates::Candidates;
+use kmcfit_core::candidates::{Candidate, Candidates};
 use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{ClassificationKind, CovarianceKind, Quantity};
 use kmcfit_core::number_format::number_or_nan;
@@ -339,7 +339,7 @@ impl ResultDocument {
         self.doubts().any(|doubt| match doubt {
             Doubt::SecondMode { .. } => true,
             Doubt::Preferred { candidates } => {
-                (candidates.first()).is_some_and(|best| best.has_second_mode() && best.explains())
+                (candidates.first()).is_some_and(Candidate::has_second_mode)
             }
             _ => false,
         })

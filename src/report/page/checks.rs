@@ -1,13 +1,13 @@
 //! Section of the checks of step, basis and terms: what was tried, and what each gave.
 
 use super::table::{paragraph, table};
-use crate::number_format::{at_most, significant};
 use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
 use crate::report::selection::SelectionStep;
 use crate::report::text::decade;
 use kmcfit_core::assessment::{ClassicalEstimate, EXACT};
 use kmcfit_core::candidates::{Candidate, Candidates, GAIN};
+use kmcfit_core::number_format::{at_most, significant};
 
 /// Step-size check, tests against larger models, and the classical estimates. Empty for a fit without any.
 pub(super) fn checks(document: &ResultDocument) -> String {

@@ -5,7 +5,6 @@ use super::overview::state;
 use super::table::{list, paragraph, table};
 use crate::config::DataFile;
 use crate::finding::Finding;
-use crate::number_format::{and_list, count};
 use crate::report::FittedModel;
 use crate::report::answer::{AnswerRow, answer};
 use crate::report::chart::Figure;
@@ -13,6 +12,7 @@ use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::extent::extent;
 use crate::report::text::{escape, prose};
 use kmcfit_core::assessment::VerdictLevel;
+use kmcfit_core::number_format::{and_list, count};
 use std::path::Path;
 
 /// Number of further files from which they are counted and not named.

@@ -6,7 +6,6 @@ use super::table::{list, number, paragraph, table};
 use super::validation::validation;
 use super::{Section, figures, overview, reproducibility, sectioned};
 use crate::finding::Finding;
-use crate::number_format::significant;
 use crate::report::FittedModel;
 use crate::report::chart::Figure;
 use crate::report::document::ResultDocument;
@@ -15,6 +14,7 @@ use crate::report::figures::weight_path;
 use crate::report::summary;
 use crate::units::{self, Unit};
 use kmcfit_core::identifiability::Quantity;
+use kmcfit_core::number_format::significant;
 
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {

@@ -1,13 +1,13 @@
 //! Status, key figures, and the tables of coefficients and records.
 
 use super::table::{list, number, table};
-use crate::number_format::count;
 use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::text::prose;
 use kmcfit_core::assessment::FunctionSummary;
 use kmcfit_core::functions::Ratio;
 use kmcfit_core::identifiability::ClassificationKind;
+use kmcfit_core::number_format::count;
 use kmcfit_core::solvers::Status;
 
 /// Status of the solver as a coloured word, and the reason.

@@ -2,11 +2,11 @@
 
 use super::figures;
 use super::table::{list, paragraph};
-use crate::number_format::and_list;
 use crate::report::FittedModel;
 use crate::report::channel_view::sentence;
 use crate::report::document::{ResultDocument, ValidationSummary};
 use crate::report::extent;
+use kmcfit_core::number_format::and_list;
 
 /// Result, basis and figures of the validation; empty without validation records.
 pub(super) fn validation(run: &FittedModel, document: &ResultDocument) -> String {

@@ -1,9 +1,9 @@
 //! Free responses of an identified system from given initial states, with 95 % bands for the errors of its parameters.
 
 use super::identified::system_of;
-use crate::number_format::significant;
 use crate::report::chart::Figure;
 use crate::report::{CsvTable, Run, figures, prediction_table};
+use kmcfit_core::number_format::significant;
 use kmcfit_core::record::{Channel, ChannelKind, Experiment, Weighting};
 use kmcfit_core::step::SimulationError;
 use kmcfit_core::study::{PredictedResponse, PredictionSummary, predict};

@@ -3,13 +3,13 @@
 use super::document::*;
 use super::records::{Optimum, finite_numbers};
 use crate::config::Model;
-use crate::number_format::{resolved, significant};
 use kmcfit_core::assessment::{Doubt, Plausibility, Unidentified};
 use kmcfit_core::diagnostics::normal_half_width;
 use kmcfit_core::functions::Ratio;
 use kmcfit_core::identifiability::{
     Band, Bands, Classification, FunctionClassification, Quantity, classify_functions,
 };
+use kmcfit_core::number_format::{resolved, significant};
 
 /// Confidence bands and the classification by them.
 pub fn bands(at: Optimum, model: &Model) -> BandsRecord {

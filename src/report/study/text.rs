@@ -5,8 +5,8 @@ use super::{
     BandsRecord, ExtremesRecord, PredictionRecord, SensitivityRecord, StudiedFit, StudyDocument,
 };
 use crate::finding::Finding;
-use crate::number_format::{resolved, significant};
 use crate::report::chart::Figure;
+use kmcfit_core::number_format::{resolved, significant};
 use kmcfit_core::study::{BOUNDED, ExtremeStatus};
 
 /// Most extremes that are listed because their search did not converge.

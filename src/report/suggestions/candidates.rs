@@ -5,6 +5,7 @@ use crate::config::Model;
 use crate::report::document::ResultDocument;
 use kmcfit_core::assessment::RecordParameter;
 use kmcfit_core::candidates::{Addition, Candidate};
+use kmcfit_core::functions::Basis;
 use kmcfit_core::system::InputQuantity;
 
 /// Suggestions about candidates that are preferred to the model or as good: the changes of the model by them, and a measurement that would tell
@@ -123,11 +124,20 @@ fn change(
                 key(function)?
             )
         }
-        Addition::FinerBasis { function } => {
+        Addition::FinerBasis { function, halvings } => {
             let own = model.problem.functions.get(function);
             let basis = own.basis.as_ref()?;
-            let knots = 2 * basis.knot_times(&model.problem.system.grid).len() - 1;
-            format!("functions.{}.knots={knots}", key(function)?)
+            let grid = &model.problem.system.grid;
+            let (name, times) = (key(function)?, 1 << halvings);
+            match basis {
+                Basis::Polynomial { degree } => {
+                    format!("functions.{name}.degree={}", times * (degree + 1) - 1)
+                }
+                _ => {
+                    let intervals = basis.knot_times(grid).len() - 1;
+                    format!("functions.{name}.knots={}", times * intervals + 1)
+                }
+            }
         }
         Addition::Jump { function, time } => {
             let grid = &model.problem.system.grid;

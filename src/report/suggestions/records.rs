@@ -2,10 +2,10 @@
 
 use super::{Suggestion, of_channel, position, written};
 use crate::config::Model;
-use crate::number_format::significant;
 use crate::report::document::ResultDocument;
 use kmcfit_core::assessment::{Doubt, RecordError};
 use kmcfit_core::functions::ScalarValue;
+use kmcfit_core::number_format::significant;
 use kmcfit_core::record::{BaseMotion, Waveform};
 use kmcfit_core::signal::{Interpolation, Signal};
 use kmcfit_core::system::InputQuantity;

@@ -2,10 +2,11 @@
 
 use super::{Suggestion, is_poor, of_channel};
 use crate::config::Model;
-use crate::number_format::{percent, significant, times_in_words};
 use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use kmcfit_core::assessment::{BEYOND_SIGMA, Doubt, EXACT, POOR, ResidualPattern};
+use kmcfit_core::candidates::Candidate;
 use kmcfit_core::diagnostics::SIGNIFICANCE;
+use kmcfit_core::number_format::{percent, significant, times_in_words};
 use kmcfit_core::solvers::StartStrategy;
 
 /// Residuals with a lower probability under white noise have a pattern.
@@ -129,7 +130,11 @@ pub(super) fn about_misfit(document: &ResultDocument, model: &Model) -> Vec<Sugg
     let records = document.experiments.iter().enumerate();
     let mut named = records.flat_map(|(i, e)| e.channels.iter().map(move |c| (i, e, c)));
     // No change of a model with one mode explains two.
-    if document.has_two_modes() {
+    let explains = |doubt: &Doubt| match doubt {
+        Doubt::Preferred { candidates } => candidates.first().is_some_and(Candidate::explains),
+        _ => true,
+    };
+    if document.has_two_modes() && document.doubts().all(explains) {
         return Vec::new();
     }
     let Some((i, record, channel)) = named.find(|(_, _, c)| is_poor(c.fit_percent)) else {

@@ -36,7 +36,7 @@ mod verdict;
 
 pub use assumptions::verdict_assumptions;
 pub use channel::{ResidualPattern, pattern};
-pub use classical::{ClassicalEstimate, ClassicalMethod};
+pub use classical::ClassicalEstimate;
 pub(crate) use constants::constant_probability;
 pub use doubt::{Doubt, Unidentified};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
@@ -73,7 +73,7 @@ use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
 use variation::variation_warnings;
 
-use crate::candidates::{Candidate, Candidates, GAIN};
+use crate::candidates::{Candidate, Candidates};
 use crate::functions::CoefficientFunction;
 use crate::identifiability::{
     Bands, FunctionClassification, Quantities, classify_functions, condition_on_bases,
@@ -322,18 +322,9 @@ fn cause(
         let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
         Some(Doubt::RecordError(or_jump(problem, found)))
     };
-    // A clear candidate that leaves white residuals explains all; others may be few samples of an input.
-    let is_clear = candidates
-        .and_then(Candidates::preferred)
-        .is_some_and(|best| best.explains() && best.gain > 2.0 * GAIN);
-    let (white, other) = match is_clear {
-        true => (preferred, None),
-        false => (None, preferred),
-    };
     jump()
         .or_else(large)
-        .or(white)
         .or_else(pulses)
-        .or(other)
+        .or(preferred)
         .or(noise)
 }

@@ -2,7 +2,7 @@
 
 use super::jump;
 use super::second_mode::Mode;
-use crate::assessment::{RecordParameter, extended, with_functions};
+use crate::assessment::{RecordParameter, extended, finer_basis, with_functions};
 use crate::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
 };
@@ -22,10 +22,12 @@ pub enum Addition {
         /// Degree of the polynomial.
         degree: usize,
     },
-    /// A function with twice as many knots, or a polynomial of twice the degree.
+    /// A function with a multiple of its intervals between knots, or a polynomial of a higher degree.
     FinerBasis {
         /// Index of the function.
         function: usize,
+        /// Number of times that the intervals are halved.
+        halvings: usize,
     },
     /// A constant that jumps.
     Jump {
@@ -100,7 +102,7 @@ impl Addition {
         match self {
             Self::Term(kind, _) => of_kind(kind),
             Self::Variation { function, .. }
-            | Self::FinerBasis { function }
+            | Self::FinerBasis { function, .. }
             | Self::Jump { function, .. } => of_kind(problem.functions.get(function).quantity),
             Self::Record(RecordParameter::Offset(..) | RecordParameter::Drift(..)) => Family::Level,
             Self::Record(RecordParameter::Delay(_) | RecordParameter::Rate(_))
@@ -137,14 +139,13 @@ impl Addition {
                 start.resize(degree + 1, 0.0);
                 in_basis(problem, theta, function, basis, start)
             }
-            Self::FinerBasis { function } => {
+            Self::FinerBasis { function, halvings } => {
                 let own = problem.functions.get(function);
                 let grid = &problem.system.grid;
-                let finer = crate::assessment::finer_basis(problem, own.basis.as_ref()?)?;
-                let values = own.design.multiply(
-                    &theta[problem.functions.ranges()[function].clone()],
-                    grid.nodes(),
-                );
+                let finer = |basis: Option<Basis>, _| finer_basis(problem, &basis?);
+                let finer = (0..halvings).fold(own.basis.clone(), finer)?;
+                let range = problem.functions.ranges()[function].clone();
+                let values = own.design.multiply(&theta[range], grid.nodes());
                 let start = finer.project(grid, &values)?;
                 in_basis(problem, theta, function, finer, start)
             }

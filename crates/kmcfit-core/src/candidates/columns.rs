@@ -191,7 +191,13 @@ fn of_structure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Op
                 let Some(finer) = own.basis.as_ref().and_then(|b| finer_basis(problem, b)) else {
                     continue;
                 };
-                (Addition::FinerBasis { function: index }, finer)
+                (
+                    Addition::FinerBasis {
+                        function: index,
+                        halvings: 1,
+                    },
+                    finer,
+                )
             }
         };
         list[index] = in_basis(own, basis, problem);

@@ -176,7 +176,7 @@ impl Candidates {
         let additions = of_ties.iter().flat_map(|c| &c.additions);
         let functions = additions.filter_map(|addition| match addition {
             Addition::Variation { function, .. }
-            | Addition::FinerBasis { function }
+            | Addition::FinerBasis { function, .. }
             | Addition::Jump { function, .. } => Some(*function),
             _ => None,
         });

@@ -25,6 +25,8 @@ const MOST: usize = 12;
 const ITERATIONS: u64 = 40;
 /// Degrees of the polynomials of a function that varies, each refitted from the one before.
 const DEGREES: [usize; 4] = [1, 2, 4, 8];
+/// Most halvings of the intervals of a basis.
+const MOST_HALVINGS: usize = 3;
 /// Rounds of a refit with what is added to predictions, and change of the sum of squares at which they end.
 const ROUNDS: usize = 12;
 const AT_REST: f64 = 1e-8;
@@ -141,6 +143,7 @@ fn pairs(
 pub(super) fn same(a: Addition, b: Addition) -> bool {
     match (a, b) {
         (Addition::Variation { function: f, .. }, Addition::Variation { function: g, .. })
+        | (Addition::FinerBasis { function: f, .. }, Addition::FinerBasis { function: g, .. })
         | (Addition::Jump { function: f, .. }, Addition::Jump { function: g, .. }) => f == g,
         (
             Addition::SecondMode {
@@ -202,6 +205,7 @@ fn refitted(
     let further = candidate.further();
     match addition {
         Addition::Variation { function, .. } => ladder(problem, theta, function),
+        Addition::FinerBasis { function, .. } => halved(problem, theta, function),
         Addition::Jump { function, time } => {
             jump::refit(problem, theta, function, time, *further.first()?)
         }
@@ -271,6 +275,25 @@ fn ladder(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
     };
     let both = best.into_iter().chain(from_beginning());
     both.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))
+}
+
+/// Refits with finer and finer bases, as long as these are better.
+fn halved(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
+    let mut best: Option<Found> = None;
+    for halvings in 1..=MOST_HALVINGS {
+        let addition = Addition::FinerBasis { function, halvings };
+        let Some(found) = plain(problem, theta, addition, &[]) else {
+            break;
+        };
+        if best
+            .as_ref()
+            .is_some_and(|best| found.judged.misfit >= best.judged.misfit)
+        {
+            break;
+        }
+        best = Some(found);
+    }
+    best
 }
 
 /// Refits with polynomials of these degrees from parameters of the problem and the polynomial.

@@ -14,7 +14,7 @@ impl Addition {
         match self {
             Self::Term(kind, _) => kind.name().to_owned(),
             Self::Variation { function: f, .. } => format!("{} that varies", function(f)),
-            Self::FinerBasis { function: f } => format!("finer basis of {}", function(f)),
+            Self::FinerBasis { function: f, .. } => format!("finer basis of {}", function(f)),
             Self::Jump { function: f, .. } => format!("jump of {}", function(f)),
             Self::Record(parameter) => {
                 let (e, c) = match parameter {
@@ -72,7 +72,7 @@ impl Addition {
                 ),
                 _ => format!("a {} that varies with time", function(f)),
             },
-            Self::FinerBasis { function: f } => format!("a finer basis of the {}", function(f)),
+            Self::FinerBasis { function: f, .. } => format!("a finer basis of the {}", function(f)),
             Self::Jump { function: f, .. } => match (stated(0, 4), stated(1, 4), stated(2, 4)) {
                 (Some(time), Some(before), Some(after)) => format!(
                     "a jump of the {} at {time} from {before} to {after}",

@@ -54,7 +54,6 @@ pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
     !active::active_rows(problem, theta).is_empty()
 }
 
-pub use crate::spans::span_words;
 pub use band::Band;
 pub use bands::Bands;
 pub use classification::{

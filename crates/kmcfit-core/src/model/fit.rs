@@ -35,7 +35,7 @@ pub struct FitSpec {
         "needs" = "method gauss-newton or projected-gradient"
     ))]
     pub qp: Option<QpSolver>,
-    /// Test of the bases at the optimum against finer ones: twice as many knots, two halves for a constant.
+    /// Judgement of what the model lacks: candidates, each the model with one thing more.
     #[schemars(extend(
         "example" = "false",
         "default" = "true",

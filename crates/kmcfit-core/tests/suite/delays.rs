@@ -196,6 +196,10 @@ fn delays_are_named_without_the_parameter() {
             .warnings;
         let named = warnings.iter().find_map(|w| match w {
             Doubt::RecordError(RecordError::Delay { samples, .. }) => Some(*samples),
+            Doubt::Preferred { candidates } => {
+                let delay = candidates[0].estimates.iter().find(|q| q.name == "delay");
+                delay.map(|q| q.value / SPACING)
+            }
             _ => None,
         });
         let found = named.unwrap_or_else(|| panic!("{delay}: {warnings:?}"));

@@ -449,6 +449,14 @@ fn count(kind: Kind, is_right: impl Fn(&Doubt) -> bool) -> Counts {
     counts
 }
 
+/// True for a doubt whose preferred candidates, or those as good, contain this name.
+fn is_preferred(doubt: &Doubt, name: &str) -> bool {
+    match doubt {
+        Doubt::Preferred { candidates } => candidates.iter().any(|c| c.name.contains(name)),
+        _ => false,
+    }
+}
+
 /// Never adequate, with the right reason in at least 80 %, and of the stated size. With 200 seeds two kinds miss the first.
 fn assert_found(kind: Kind, is_right: impl Fn(&Doubt) -> bool) {
     let counts = count(kind, is_right);
@@ -547,25 +555,21 @@ fn corrected_records_predict_another_record() {
 #[test]
 fn quadratic_damping_as_viscous() {
     let of = CoefficientKind::QUADRATIC_DAMPING;
-    assert_found(
-        Kind::QuadraticDamping,
-        |reason| matches!(reason, Doubt::MissingTerm(missing) if missing.term == of),
-    );
+    assert_found(Kind::QuadraticDamping, |reason| {
+        is_preferred(reason, of.name())
+    });
 }
 
 #[test]
 fn friction_left_out() {
     let of = CoefficientKind::COULOMB_FRICTION;
-    assert_found(
-        Kind::Friction,
-        |reason| matches!(reason, Doubt::MissingTerm(missing) if missing.term == of),
-    );
+    assert_found(Kind::Friction, |reason| is_preferred(reason, of.name()));
 }
 
 #[test]
 fn a_second_mode() {
     assert_found(Kind::SecondMode, |reason| {
-        matches!(reason, Doubt::SecondMode { .. })
+        is_preferred(reason, "second mode")
     });
 }
 
@@ -574,10 +578,7 @@ fn a_second_mode() {
 #[test]
 fn a_weak_second_mode() {
     assert_found(Kind::WeakMode, |reason| {
-        matches!(
-            reason,
-            Doubt::CoherentResiduals { .. } | Doubt::SecondMode { .. }
-        )
+        matches!(reason, Doubt::CoherentResiduals { .. }) || is_preferred(reason, "second mode")
     });
 }
 

@@ -6,7 +6,6 @@ use super::unit::QuantityColumn;
 use crate::config::lowering::ModelKey;
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
-use crate::number_format::significant;
 use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, lines_in_words,
     repeated_times, sample_rates, without_rounding,
@@ -15,6 +14,7 @@ use crate::units::{Measurand, Unit};
 use kmcfit_core::model::{
     ColumnId, ColumnRef, DecimalSign, Delimiter, ExperimentSpec, OneOrList, ScalarOr, SourceSpec,
 };
+use kmcfit_core::number_format::significant;
 use serde_json::json;
 use std::borrow::Cow;
 use std::ops::Range;

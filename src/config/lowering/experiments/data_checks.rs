@@ -5,12 +5,12 @@ use crate::config::ModelFile;
 use crate::config::dominant::Oscillation;
 use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
-use crate::number_format::significant;
 use crate::tables::codes_of_column;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::finding::Severity;
 use kmcfit_core::model::{ExperimentSpec, InitialSpec, KnownValue, ScalarSpec};
+use kmcfit_core::number_format::significant;
 use kmcfit_core::record::{ChannelKind, Loss};
 use kmcfit_core::signal::{
     Interpolation, Signal, Spectrum, driven_oscillator, is_kept_up, median, onset,

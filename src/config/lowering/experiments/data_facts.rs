@@ -3,9 +3,9 @@
 use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::number_format::{count as counted, significant};
 use crate::tables::{Table, TableFormat};
 use kmcfit_core::finding::Severity;
+use kmcfit_core::number_format::{count as counted, significant};
 use serde::Serialize;
 use serde_json::Value;
 use std::rc::Rc;

@@ -7,12 +7,12 @@ use super::data_facts::{
     gaps_in_words, spans_in_words, time, times_in_words,
 };
 use crate::finding::Finding;
-use crate::number_format::{count as counted, significant};
 use crate::units::Unit;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::standard_deviation;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::model::FaultName;
+use kmcfit_core::number_format::{count as counted, significant};
 use kmcfit_core::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::system::round_time;
 use kmcfit_core::threads::{available_for, both};

@@ -11,7 +11,7 @@
 use super::FinerNodes;
 use crate::config::lowering::experiments::RawRecord;
 use crate::finding::Finding;
-use crate::number_format::significant;
+use kmcfit_core::number_format::significant;
 use kmcfit_core::signal::Spectrum;
 use kmcfit_core::system::Method;
 use std::f64::consts::TAU;

@@ -10,12 +10,12 @@ use super::{ChannelNote, names};
 use crate::config::lowering::ModelKey;
 use crate::config::lowering::experiments::Entry;
 use crate::error::InputError;
-use crate::number_format::{count, significant};
 use crate::units::Unit;
 use kmcfit_core::model::{
     ColumnId, ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec,
     ScalarOr, SensorSpec, SigmaValue,
 };
+use kmcfit_core::number_format::{count, significant};
 use kmcfit_core::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::signal::{SecondOrder, even_spacing, median_spacing};
 use kmcfit_core::system::Grid;

@@ -4,8 +4,8 @@ use super::super::data_facts::{ADDED_TO_SIGMA, Action, LEAST_SIGMA, USED};
 use super::Spec;
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
-use crate::number_format::significant;
 use kmcfit_core::model::{CorrelationName, LossName, ScalarOr, SigmaValue};
+use kmcfit_core::number_format::significant;
 use kmcfit_core::record::{Loss, NoiseModel, Weighting};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.

@@ -3,8 +3,8 @@
 use super::super::column_samples;
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
-use crate::number_format::count;
 use kmcfit_core::model::ExperimentSpec;
+use kmcfit_core::number_format::count;
 use kmcfit_core::signal::{SecondOrder, band_pass, even_spacing, high_pass, low_pass};
 
 /// Order of the filter of a band, run forward and backward.
