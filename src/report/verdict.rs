@@ -183,12 +183,7 @@ impl FittedModel<'_> {
         let candidates = assessment.and_then(|a| a.candidates.as_ref());
         let step_size = self.run_assessment.step_check();
         let step_size = step_size.map(|_| "step-size check passed".to_owned());
-        let candidates = candidates.map(|found| {
-            format!(
-                "none of {} candidates is preferred to the model",
-                found.list.len()
-            )
-        });
+        let candidates = candidates.map(|_| "no candidate is preferred to the model".to_owned());
         let parts = residuals.into_iter().chain(step_size).chain(candidates);
         let parts: Vec<String> = parts.collect();
         parts.join("; ")

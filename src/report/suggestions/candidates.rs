@@ -1,11 +1,13 @@
 //! The candidate that is preferred to the model as a change of the model file, or as what is to be measured.
 
+use super::records::about_delay;
 use super::{Step, Suggestion, written};
 use crate::config::Model;
 use crate::report::document::ResultDocument;
 use kmcfit_core::assessment::RecordParameter;
 use kmcfit_core::candidates::{Addition, Candidate};
 use kmcfit_core::functions::Basis;
+use kmcfit_core::signal::median_spacing;
 use kmcfit_core::system::InputQuantity;
 
 /// Suggestions about candidates that are preferred to the model or as good: the changes of the model by them, and a measurement that would tell
@@ -166,13 +168,12 @@ fn change(
             RecordParameter::Drift(e, c) => sensor(e, c, "drift"),
             RecordParameter::Gain(e, c) => sensor(e, c, "gain"),
             RecordParameter::Delay(e) => {
-                let record = document.experiments.get(e)?;
-                match record.channels.as_slice() {
-                    [only] => format!("experiments.{e}.sensors.{}.delay=estimate", only.kind),
-                    _ => {
-                        let input = input(model, e)?.name();
-                        format!("experiments.{e}.sensors.{input}.delay=estimate")
-                    }
+                let channel = model.problem.experiments[e].channels.first()?;
+                let samples = estimate(0)? / median_spacing(channel.times());
+                let name = &document.experiments.get(e)?.name;
+                match about_delay(document, name, samples)?.step {
+                    Step::Change(mut overrides) => overrides.pop()?,
+                    _ => return None,
                 }
             }
             RecordParameter::Rate(_) => return None,

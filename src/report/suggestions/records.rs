@@ -97,7 +97,11 @@ pub(super) fn about_error(
 }
 
 /// Another interpolation of the input, or an estimated delay, for a response that lags by these samples.
-fn about_delay(document: &ResultDocument, experiment: &str, samples: f64) -> Option<Suggestion> {
+pub(super) fn about_delay(
+    document: &ResultDocument,
+    experiment: &str,
+    samples: f64,
+) -> Option<Suggestion> {
     let i = position(document, experiment)?;
     let record = &document.experiments[i];
     let is_force = record.driven_by.iter().any(|d| d == "force");

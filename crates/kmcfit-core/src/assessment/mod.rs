@@ -279,6 +279,9 @@ impl FitAssessment {
     }
 }
 
+/// Gain from which a candidate is no mistake for errors of few samples of an input, which gain up to about 40 so.
+const LARGE_GAIN: f64 = 60.0;
+
 fn is_constant(function: &CoefficientFunction) -> bool {
     function.parameters() < 2
 }
@@ -311,7 +314,7 @@ fn cause(
     let noise = noise.and_then(|e| Disturbance::of(problem, evaluation, e));
     let noise = noise.map(|found| found.doubt());
     let preferred = preferred.map(|candidates| Doubt::Preferred {
-        candidates: candidates.ties().to_vec(),
+        candidates: candidates.ties(),
     });
     let jump = || {
         let found = connected_jump(problem, theta, evaluation).filter(|_| is_system);
@@ -322,9 +325,13 @@ fn cause(
         let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
         Some(Doubt::RecordError(or_jump(problem, found)))
     };
-    jump()
-        .or_else(large)
-        .or_else(pulses)
-        .or(preferred)
-        .or(noise)
+    // A large gain that leaves white residuals explains all; a smaller one may be that of few samples of an input.
+    let best = candidates.and_then(Candidates::preferred);
+    let is_clear = best.is_some_and(|best| best.explains() && best.gain > LARGE_GAIN);
+    let (clear, other) = match is_clear {
+        true => (preferred, None),
+        false => (None, preferred),
+    };
+    let found = jump().or_else(large).or(clear).or_else(pulses);
+    found.or(other).or(noise)
 }

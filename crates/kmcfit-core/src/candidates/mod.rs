@@ -172,12 +172,11 @@ impl Candidates {
 
     /// Functions that may vary more than those of the model.
     pub fn varying(&self) -> Vec<usize> {
-        let of_ties = self.preferred().map_or(&[][..], |_| self.ties());
-        let additions = of_ties.iter().flat_map(|c| &c.additions);
+        let additions = self.ties().into_iter().flat_map(|c| c.additions);
         let functions = additions.filter_map(|addition| match addition {
             Addition::Variation { function, .. }
             | Addition::FinerBasis { function, .. }
-            | Addition::Jump { function, .. } => Some(*function),
+            | Addition::Jump { function, .. } => Some(function),
             _ => None,
         });
         functions.collect()
@@ -192,15 +191,26 @@ impl Candidates {
         constants.cloned().collect()
     }
 
-    /// Those that are about as good as the one that is preferred, which comes first; without one those that are about as good as the model.
-    pub fn ties(&self) -> &[Candidate] {
-        let most = self.preferred().map_or(0.0, |best| best.gain);
-        let count = self
-            .list
-            .iter()
-            .take_while(|c| c.gain > most - GAIN)
-            .count();
-        &self.list[..count]
+    /// Those that are about as good as the one that is preferred, which comes first, but for it with something more; none without one.
+    pub fn ties(&self) -> Vec<Candidate> {
+        let Some(best) = self.preferred() else {
+            return Vec::new();
+        };
+        let has = |candidate: &Candidate, addition: &Addition| {
+            let mut own = candidate.additions.iter();
+            own.any(|own| refits::same(*own, *addition))
+        };
+        let is_more = |candidate: &Candidate| {
+            candidate.additions.len() > best.additions.len()
+                && best
+                    .additions
+                    .iter()
+                    .all(|addition| has(candidate, addition))
+        };
+        let near = self.list.iter().take_while(|c| c.gain > best.gain - GAIN);
+        near.filter(|candidate| !is_more(candidate))
+            .cloned()
+            .collect()
     }
 }
 

@@ -95,14 +95,16 @@ impl Case {
     }
 }
 
-/// The offset of a sensor that is preferred to the model.
+/// The offset of a sensor that is preferred to the model, or as good as what is.
 fn offset(doubt: &Doubt) -> Option<f64> {
     let Doubt::Preferred { candidates } = doubt else {
         return None;
     };
-    let best = &candidates[0];
     let is_offset = |a: &Addition| matches!(a, Addition::Record(RecordParameter::Offset(..)));
-    (best.additions.iter().any(is_offset)).then(|| best.estimates[0].value)
+    let offset = candidates
+        .iter()
+        .find(|c| c.additions.iter().all(is_offset))?;
+    Some(offset.estimates[0].value)
 }
 
 /// One of 40 at most; none in these.
