@@ -1,7 +1,7 @@
 //! Fits of models: with their noise, the weights chosen by a rule, finer grids where the number of nodes is automatic.
 
 use crate::config::{AutomaticGrid, Model, WeightSearch};
-use crate::finding::Finding;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::problem::Problem;
 use kmcfit_core::solvers::{
     Fit, GridNotice, Observer, OnNodes, WeightPath, choose_weight_watched, fit_on_refined_grids,

@@ -44,5 +44,4 @@ mod text_io;
 pub mod units;
 
 pub use analysis::{Analysis, analyse};
-pub use kmcfit_core::finding;
 pub use report::Run;

@@ -5,6 +5,7 @@ use crate::source::RawModel;
 use kmcfit::config::ModelFile;
 use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
+use kmcfit::report::selection::{Selected, select};
 use kmcfit::report::{CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json};
 use kmcfit::results::OutputFolder;
 use kmcfit_core::solvers::{IterationRecord, Observer, Status};
@@ -36,6 +37,7 @@ pub struct RawFit {
 pub fn fit(
     py: Python<'_>,
     model: Py<RawModel>,
+    selects: bool,
     progress: Option<Py<PyAny>>,
     is_main_thread: bool,
 ) -> PyResult<RawFit> {
@@ -43,8 +45,12 @@ pub fn fit(
     let flag = Arc::new(AtomicBool::new(false));
     let interrupt = Arc::clone(&flag);
     let (result, signal) = match is_main_thread && model.is_small() {
-        true => polled(py, &flag, |poll| fitted(model, interrupt, progress, poll)),
-        false => py.detach(|| watched(&flag, || fitted(model, interrupt, progress, &mut || ()))),
+        true => polled(py, &flag, |poll| {
+            fitted(model, selects, interrupt, progress, poll)
+        }),
+        false => py.detach(|| watched(&flag, || {
+                fitted(model, selects, interrupt, progress, &mut || ())
+            })),
     };
     ended(py, result, signal, RawFit::is_interrupted)
 }
@@ -131,6 +137,7 @@ fn polled<T: Send>(
 /// Fits a model; `poll` is called after each iteration.
 fn fitted(
     source: &RawModel,
+    selects: bool,
     interrupt: Arc<AtomicBool>,
     progress: Option<Py<PyAny>>,
     poll: &mut dyn FnMut(),
@@ -157,8 +164,12 @@ fn fitted(
     }
     let found = found.map_err(Failure::Numerical)?;
     let analysis = Instant::now();
-    let done = CompletedFit::of(found);
-    let mut document = done.fitted(RequestedFiles::figures()).document();
+    let (fit, requested) = (CompletedFit::of(found), RequestedFiles::figures());
+    let found = match selects {
+        true => select(source.file(), fit, requested),
+        false => Selected::of(source.file(), fit, requested),
+    };
+    let (file, done, mut document) = (found.file, found.fit, found.document);
     let overhead = OverheadTimings {
         io: model.preparation.reading,
         analysis: analysis.elapsed(),
@@ -167,7 +178,7 @@ fn fitted(
     let total = (model.preparation.total + clock.elapsed()).max(overhead.sum() + done.fit.elapsed);
     document.timings = TimingsSummary::new(&done.fit, &overhead, total);
     Ok(RawFit {
-        file: source.file().clone(),
+        file,
         done,
         document,
     })
@@ -193,6 +204,7 @@ impl RawFit {
         let run = self.done.fitted(requested);
         let mut document = run.document();
         document.timings = self.document.timings.clone();
+        document.selection = self.document.selection.clone();
         let text = match in_memory.is_empty() {
             true => &self.file.text,
             false => self.file.effective_text(),

@@ -202,3 +202,18 @@ def test_the_text_of_a_model_is_kept_for_the_next_record(record):
     estimates = [model.fit(data).parameters for data in records]
     assert estimates == [km.Model(mass=2.4).fit(data).parameters for data in records]
     assert estimates[0] != estimates[1] != estimates[2]
+
+
+def test_what_is_preferred_is_added(record, fit, tmp_path):
+    time, force, acceleration = record
+    data = km.Experiment(time=time, force=force, acceleration=acceleration + 0.1)
+    plain, chosen = km.Model(mass=2.4).fit(data), km.Model(mass=2.4).fit(data, select=True)
+    assert "selection" not in plain.result and plain.verdict.level != "adequate"
+    (step,) = chosen.result["selection"]
+    assert "offset" in step["added"] and step["gain"] > 6.0
+    assert chosen.verdict.level == "adequate"
+    low, high = next(row for row in chosen.estimates if "offset" in row.quantity).ci95
+    # Five standard errors about the offset that was put in.
+    assert abs(0.5 * (low + high) - 0.1) < 1.25 * (high - low)
+    chosen.save(tmp_path / "run")
+    assert km.open(tmp_path / "run").result["selection"] == chosen.result["selection"]

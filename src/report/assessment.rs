@@ -5,8 +5,8 @@ use super::document::IdentifiabilitySummary;
 use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
-use crate::finding::Finding;
 use kmcfit_core::assessment::{Doubt, FunctionSummary, function_summaries};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{
     Classification, FunctionClassification, Target, structural_rank,

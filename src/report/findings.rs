@@ -1,7 +1,7 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
-use crate::finding::Finding;
 use kmcfit_core::assessment::NoIntervals;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::identifiability::{Classification, FunctionClassification, RankFinding};
 use kmcfit_core::number_format::{count, resolved, significant};
 use kmcfit_core::study::MultistartFinding;

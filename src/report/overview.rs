@@ -2,9 +2,9 @@
 
 use super::findings;
 use crate::config::{ChannelNote, Model};
-use crate::finding::Finding;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::functions::{CoefficientFunction, Ratio};
 use kmcfit_core::identifiability::{ScalingAmbiguity, Sensitivity, structural_rank};
 use kmcfit_core::number_format::significant;

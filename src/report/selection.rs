@@ -1,6 +1,6 @@
 //! `kmcfit fit --select`: adds the candidate that is preferred to the model, fits, and asks again, until none is preferred.
 
-use super::document::ResultDocument;
+use super::document::{ResultDocument, SelectionStep};
 use super::suggestions::overrides_of;
 use super::{CompletedFit, RequestedFiles};
 use crate::config::{BuildMode, ModelFile, Override, build};
@@ -8,28 +8,10 @@ use crate::fitting::fit_model;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::candidates::Candidate;
 use kmcfit_core::solvers::{Initial, IterationRecord, Observer, Status};
-use serde::{Deserialize, Serialize};
 use std::sync::atomic::Ordering;
 
 /// Most additions; a pair is two.
 const MOST: usize = 5;
-
-/// One addition to the model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SelectionStep {
-    /// What was added, in words.
-    pub added: String,
-    /// Its gain.
-    pub gain: f64,
-    /// Overrides of the model file that add it.
-    pub set: Vec<String>,
-    /// Natural frequency before and after, Hz; absent where there is none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub natural_frequency: Option<[f64; 2]>,
-    /// Damping ratio before and after.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub damping_ratio: Option<[f64; 2]>,
-}
 
 /// A fit with its model file and document.
 pub struct Selected {

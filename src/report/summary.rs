@@ -5,8 +5,8 @@ use super::document::{AttemptSummary, ChannelSummary, PenaltySummary, Prediction
 use super::equation::equation_residual;
 use super::extent::{extent, validation};
 use super::rule_names::rule_in_words;
-use crate::finding::Finding;
 use kmcfit_core::assessment::{ClassicalEstimate, Doubt};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::functions::WeightRule;
 use kmcfit_core::identifiability::Quantity;

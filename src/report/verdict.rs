@@ -4,12 +4,12 @@ use super::document::{Estimates, Verdict};
 use super::fit_assessment::ValidationRecord;
 use super::ratios;
 use super::run::FittedModel;
-use crate::finding::Finding;
 use kmcfit_core::assessment::{
     Doubt, Estimate, EstimateStatus, Implausible, VerdictLevel, estimates, verdict_assumptions,
     verdict_reasons,
 };
 use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::functions::Ratio;
 use kmcfit_core::solvers::{EquationBalance, Status};

@@ -2,7 +2,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit::finding::Finding;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::solvers::{Initial, Solver};
 
 /// A model with 21 samples over 2 s; line 8 is the mass, line 11 the constraints, line 12 the fit.

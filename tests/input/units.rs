@@ -2,7 +2,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit::finding::Finding;
+use kmcfit_core::finding::Finding;
 
 /// Warnings about a table with columns of time and displacement, or its error; and the last time, s.
 fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), String> {

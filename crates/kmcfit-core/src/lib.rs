@@ -60,6 +60,7 @@
     clippy::result_large_err,
     reason = "what failed is returned to be used again"
 )]
+mod alternatives;
 pub mod assessment;
 pub mod builder;
 pub mod candidates;
@@ -78,6 +79,7 @@ pub mod qp;
 pub mod record;
 mod rows;
 mod scalar_search;
+mod severity;
 pub mod signal;
 pub mod simd;
 pub mod solvers;

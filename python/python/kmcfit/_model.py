@@ -149,6 +149,7 @@ class Model:
         *data: Experiment,
         set: Optional[Overrides] = None,  # noqa: A002
         progress: Optional[Progress] = None,
+        select: bool = False,
     ) -> Fit:
         """Fits the model to records.
 
@@ -163,6 +164,8 @@ class Model:
             Changed keys, e.g. ``{"fit.stop.iterations": 50}``.
         progress : callable, optional
             Called with the number and the cost of each iteration, from another thread; its exception ends the fit, and is raised.
+        select : bool
+            Adds the candidate that is preferred to the model, fits, and asks again, until none is preferred: at most five.
 
         Returns
         -------
@@ -175,7 +178,7 @@ class Model:
         NumericalError
             If no starting point has a response.
         """
-        return Fit._of(_kmcfit.fit(self._ready(data, overrides(set)), progress, _is_main_thread()))
+        return Fit._of(_kmcfit.fit(self._ready(data, overrides(set)), select, progress, _is_main_thread()))
 
     def study(
         self,
@@ -272,9 +275,11 @@ def fit_model(
     path: Union[str, "os.PathLike[str]"],
     set: Optional[Overrides] = None,  # noqa: A002
     progress: Optional[Progress] = None,
+    select: bool = False,
 ) -> Fit:
     """Fits the model of a file, as ``kmcfit fit`` does, with the same results. See `Model.fit`."""
-    return Fit._of(_kmcfit.fit(_kmcfit.RawModel(None, os.fspath(path), {}, overrides(set)), progress, _is_main_thread()))
+    raw = _kmcfit.RawModel(None, os.fspath(path), {}, overrides(set))
+    return Fit._of(_kmcfit.fit(raw, select, progress, _is_main_thread()))
 
 
 def init(*paths: Union[str, "os.PathLike[str]"]) -> Model:

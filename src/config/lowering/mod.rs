@@ -21,9 +21,9 @@ pub use study::StudyPlan;
 
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
-use crate::finding::Finding;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::builder::{BuildError, Builder, Contradiction, listed};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::host::Instant;
 use kmcfit_core::problem::Problem;

@@ -3,22 +3,23 @@
 mod channel;
 mod estimates;
 mod fit_summaries;
+mod selection_step;
 mod verdict;
 
 pub use channel::{ChannelSummary, IgnoredSummary, NoiseSummary, ValidationSummary};
 pub use estimates::Estimates;
 pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
+pub use selection_step::SelectionStep;
 pub use verdict::{Verdict, level_in_words};
 
 use crate::config::DataFile;
-use crate::finding::Finding;
 use crate::report::cost::CostKind;
-use crate::report::selection::SelectionStep;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::assessment::{
     ClassicalEstimate, Doubt, FitStatistics, FunctionSummary, StepCheck,
 };
 use kmcfit_core::candidates::{Candidate, Candidates};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::identifiability::{ClassificationKind, CovarianceKind, Quantity};
 use kmcfit_core::number_format::number_or_nan;

@@ -1,7 +1,7 @@
 //! Verdict on a fit in the result document.
 
-use crate::finding::Finding;
 use kmcfit_core::assessment::VerdictLevel;
+use kmcfit_core::finding::Finding;
 use serde::{Deserialize, Serialize};
 
 /// Verdict on a fit.

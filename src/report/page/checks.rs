@@ -3,7 +3,7 @@
 use super::table::{paragraph, table};
 use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
-use crate::report::selection::SelectionStep;
+use crate::report::document::SelectionStep;
 use crate::report::text::decade;
 use kmcfit_core::assessment::{ClassicalEstimate, EXACT};
 use kmcfit_core::candidates::{Candidate, Candidates, GAIN};

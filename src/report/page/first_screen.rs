@@ -4,7 +4,6 @@ use super::figures;
 use super::overview::state;
 use super::table::{list, paragraph, table};
 use crate::config::DataFile;
-use crate::finding::Finding;
 use crate::report::FittedModel;
 use crate::report::answer::{AnswerRow, answer};
 use crate::report::chart::Figure;
@@ -12,6 +11,7 @@ use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::extent::extent;
 use crate::report::text::{escape, prose};
 use kmcfit_core::assessment::VerdictLevel;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::number_format::{and_list, count};
 use std::path::Path;
 

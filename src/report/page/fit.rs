@@ -5,7 +5,6 @@ use super::first_screen::first_screen;
 use super::table::{list, number, paragraph, table};
 use super::validation::validation;
 use super::{Section, figures, overview, reproducibility, sectioned};
-use crate::finding::Finding;
 use crate::report::FittedModel;
 use crate::report::chart::Figure;
 use crate::report::document::ResultDocument;
@@ -13,6 +12,7 @@ use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
 use crate::report::summary;
 use crate::units::{self, Unit};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::identifiability::Quantity;
 use kmcfit_core::number_format::significant;
 

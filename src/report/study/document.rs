@@ -1,7 +1,7 @@
 //! The document of a study, `study.json` and the records of its analyses.
 
-use crate::finding::Finding;
 use crate::report::document::Verdict;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::solvers::Status;
 use kmcfit_core::study::ExtremeStatus;
 use serde::{Deserialize, Serialize};

@@ -2,9 +2,9 @@
 
 use super::document::*;
 use crate::config::Model;
-use crate::finding::Finding;
 use crate::report::findings;
 use kmcfit_core::diagnostics::chi_square_one;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::identifiability::{
     Ranked, ScalingAmbiguity, Sensitivity, Target, rank_experiments,
 };

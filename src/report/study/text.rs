@@ -4,8 +4,8 @@ use super::figures;
 use super::{
     BandsRecord, ExtremesRecord, PredictionRecord, SensitivityRecord, StudiedFit, StudyDocument,
 };
-use crate::finding::Finding;
 use crate::report::chart::Figure;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::number_format::{resolved, significant};
 use kmcfit_core::study::{BOUNDED, ExtremeStatus};
 

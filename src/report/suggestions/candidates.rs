@@ -4,7 +4,7 @@ use super::records::about_delay;
 use super::{Step, Suggestion, written};
 use crate::config::Model;
 use crate::report::document::ResultDocument;
-use kmcfit_core::assessment::RecordParameter;
+use kmcfit_core::candidates::RecordParameter;
 use kmcfit_core::candidates::{Addition, Candidate};
 use kmcfit_core::functions::Basis;
 use kmcfit_core::signal::median_spacing;
@@ -188,6 +188,7 @@ fn change(
             format!("experiments.{e}.{part}.interpolation=cubic")
         }
         Addition::Disturbance { .. }
+        | Addition::InputPulses { .. }
         | Addition::SensorCurve { .. }
         | Addition::Tone { .. }
         | Addition::SecondMode { .. } => return None,

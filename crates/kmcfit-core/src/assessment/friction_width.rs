@@ -5,7 +5,7 @@
 //! that of the system, and no artefact of the smoothing.
 
 use super::Doubt;
-use super::span::Span;
+use crate::alternatives::Span;
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::Problem;

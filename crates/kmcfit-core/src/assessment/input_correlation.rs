@@ -11,11 +11,11 @@
 //! the variance of the innovations that is coherent with the input.
 
 use super::Doubt;
+use crate::alternatives::measured;
 use crate::objective::{Evaluation, channel_fit_percent};
 use crate::problem::Problem;
-use crate::record::{BaseMotion, Channel, Experiment, Loss, Waveform};
+use crate::record::{Channel, Loss};
 use crate::signal::Signal;
-use crate::system::InputQuantity;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -50,17 +50,6 @@ pub(super) fn coherent_residuals(problem: &Problem, evaluation: &Evaluation) -> 
         input,
         share,
     })
-}
-
-/// The measured input of an experiment with one input.
-pub(super) fn measured(experiment: &Experiment) -> Option<(InputQuantity, &Signal)> {
-    match (&experiment.input.force, &experiment.input.base) {
-        (Some(Waveform::Samples(signal)), None) => Some((InputQuantity::Force, signal)),
-        (None, Some(BaseMotion::Acceleration(signal))) => {
-            Some((InputQuantity::BaseAcceleration, signal))
-        }
-        _ => None,
-    }
 }
 
 /// Share of the innovations of a channel that is coherent with the input; `None` where it is not significant, and for samples at unequal

@@ -1,10 +1,9 @@
 //! Jumps of an input between two samples, at a time that no interpolation knows.
 
-use super::input_correlation::measured;
-use super::interpolation_loss::with_input;
 use super::record_error::RecordError;
-use super::refinement::applies;
-use super::refit::{Refit, without_correlation, worst_misfit};
+use crate::alternatives::{
+    Refit, applies, measured, with_input, without_correlation, worst_misfit,
+};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::signal::{Interpolation, Signal, jumps};

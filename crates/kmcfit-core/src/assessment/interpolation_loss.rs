@@ -8,12 +8,11 @@
 //! White residuals show that the input is as interpolated, unless errors of the input are stated, which whiten what an interpolation leaves.
 
 use super::Doubt;
-use super::input_correlation::measured;
 use super::median_frequency::median_frequency;
+use crate::alternatives::{with_cubics, with_input};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::record::{BaseMotion, Input, Waveform};
-use crate::signal::{Interpolation, Signal, median_spacing};
+use crate::signal::{Signal, median_spacing};
 use crate::simd::sum::rms;
 use crate::system::InputQuantity;
 use std::f64::consts::PI;
@@ -75,50 +74,10 @@ pub(super) fn is_loss(problem: &Problem, losses: &[Doubt], warning: &Doubt) -> b
     most.is_some_and(|most| (*given..most).contains(likely))
 }
 
-/// The problem with cubic splines in place of the lines between the samples of all inputs; `None` where no lines connect them.
-pub(crate) fn with_cubic_inputs(problem: &Problem) -> Option<Problem> {
-    let mut other: Option<Problem> = None;
-    for e in 0..problem.experiments.len() {
-        if let Some(cubic) = with_cubics(problem, e) {
-            other = Some(with_input(other.as_ref().unwrap_or(problem), e, cubic)?);
-        }
-    }
-    other
-}
-
 /// Factor by which lines pass a sine of so many cycles per sample.
 fn passed(cycles: f64) -> f64 {
     let sinc = (PI * cycles).sin() / (PI * cycles);
     sinc * sinc
-}
-
-/// The input of experiment `e`, if lines connect its samples, with cubic splines in their place. With errors of the input the samples are those
-/// of the estimated input.
-fn with_cubics(problem: &Problem, e: usize) -> Option<(InputQuantity, Signal)> {
-    let experiment = &problem.experiments[e];
-    let (input, times, values) = match (measured(experiment), &experiment.input_error) {
-        (Some((input, signal)), _) => {
-            (signal.interpolation() == Interpolation::Linear).then_some(())?;
-            (input, signal.times().to_vec(), signal.values().to_vec())
-        }
-        (None, Some(error)) if error.interpolation == Interpolation::Linear => {
-            let excitation = experiment.excitation.as_ref()?;
-            let at_nodes = excitation.quantity(error.quantity)?.at_nodes();
-            let grid = &problem.system.grid;
-            let last = at_nodes.len().checked_sub(2)?;
-            let at = |t: &f64| {
-                let position = (t - grid.start()) / grid.step();
-                let left = (position.max(0.0) as usize).min(last);
-                let share = position - left as f64;
-                at_nodes[left] + share * (at_nodes[left + 1] - at_nodes[left])
-            };
-            let values = error.times.iter().map(at).collect();
-            (error.quantity, error.times.clone(), values)
-        }
-        _ => return None,
-    };
-    let cubic = Signal::new(times, values, Interpolation::Cubic)?;
-    Some((input, cubic))
 }
 
 /// Largest shift of a parameter, in standard errors, with this signal in place of the input of experiment `e`.
@@ -143,32 +102,10 @@ fn shift_by(
     Some(errors.filter(|x| x.is_finite()).fold(0.0, f64::max))
 }
 
-/// The problem with this signal in place of the input of experiment `e`.
-pub(super) fn with_input(
-    problem: &Problem,
-    e: usize,
-    (input, signal): (InputQuantity, Signal),
-) -> Option<Problem> {
-    let mut other = problem.clone();
-    let grid = other.system.grid;
-    let experiment = other.parts_mut().experiments.get_mut(e)?;
-    let input = match input {
-        InputQuantity::Force => Input {
-            force: Some(Waveform::Samples(signal)),
-            base: None,
-        },
-        InputQuantity::BaseAcceleration => Input {
-            force: None,
-            base: Some(BaseMotion::Acceleration(signal)),
-        },
-    };
-    experiment.excitation = Some(input.on(&grid, experiment.nodes));
-    Some(other)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Interpolation;
     use std::f64::consts::TAU;
 
     /// The factor is the projection of the interpolated sine on the sine, over many periods.

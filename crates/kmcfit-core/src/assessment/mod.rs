@@ -7,33 +7,27 @@ mod constants;
 mod doubt;
 mod equation_error;
 mod estimates;
-mod extension;
 mod friction_width;
 mod function;
 mod implausible;
 mod input_correlation;
 mod input_disturbance;
 mod input_jumps;
-mod input_pulses;
 mod interpolation_loss;
 mod large_covariance;
 mod median_frequency;
-mod minimum;
 mod parts;
 mod plausibility;
 mod record_error;
 mod record_errors;
-mod record_parameters;
 mod recovery;
-mod refinement;
-mod refit;
 mod sentences;
-mod span;
 mod statistics;
 mod step_check;
 mod variation;
 mod verdict;
 
+pub use crate::alternatives::POOR;
 pub use assumptions::verdict_assumptions;
 pub use channel::{ResidualPattern, pattern};
 pub use classical::ClassicalEstimate;
@@ -45,7 +39,7 @@ pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use implausible::Implausible;
 pub use large_covariance::quantities_of_many;
 pub use parts::Parts;
-pub use plausibility::{BEYOND_SIGMA, EXACT, POOR, Plausibility};
+pub use plausibility::{BEYOND_SIGMA, EXACT, Plausibility};
 pub use record_error::RecordError;
 pub use recovery::TruthErrors;
 pub use statistics::FitStatistics;
@@ -54,26 +48,15 @@ pub use step_check::StepCheck;
 pub(crate) use step_check::StepCheckOutcome;
 pub use verdict::{VerdictLevel, verdict_reasons};
 
-pub(crate) use extension::{extended, with_functions};
-pub(crate) use input_disturbance::Disturbance;
-pub(crate) use interpolation_loss::with_cubic_inputs;
-pub(crate) use minimum::Minimum;
-pub(crate) use record_errors::on_best_clock;
-pub use record_parameters::RecordParameter;
-pub(crate) use record_parameters::{Clock, RecordColumns, record_parameters, with_samples_of};
-pub(crate) use refinement::{applies, finer_basis};
-pub(crate) use refit::{Refit, uncorrelated};
-pub(crate) use span::{Span, weighted_residuals};
-
 use classical::classical_estimate;
 use friction_width::width_warning;
 use input_jumps::{connected_jump, or_jump};
-use input_pulses::input_pulses;
 use interpolation_loss::{interpolation_losses, is_loss};
 use record_errors::large_error;
 use variation::variation_warnings;
 
-use crate::candidates::{Candidate, Candidates};
+use crate::alternatives::Disturbance;
+use crate::candidates::Candidates;
 use crate::functions::CoefficientFunction;
 use crate::identifiability::{
     Bands, FunctionClassification, Quantities, classify_functions, condition_on_bases,
@@ -279,9 +262,6 @@ impl FitAssessment {
     }
 }
 
-/// Gain from which a candidate is no mistake for errors of few samples of an input, which gain up to about 40 so.
-const LARGE_GAIN: f64 = 60.0;
-
 fn is_constant(function: &CoefficientFunction) -> bool {
     function.parameters() < 2
 }
@@ -302,36 +282,33 @@ fn cause(
         return Some(width);
     }
     judges_candidates.then_some(())?;
-    let preferred = candidates.filter(|candidates| {
-        // What is noise has its own warning.
-        candidates
-            .preferred()
-            .is_some_and(|best| best.disturbed_experiment().is_none())
-    });
-    let noise = candidates.and_then(Candidates::preferred);
-    let noise = noise.and_then(Candidate::disturbed_experiment);
-    let noise = noise.filter(|_| is_system && !plausibility.is_disturbed);
-    let noise = noise.and_then(|e| Disturbance::of(problem, evaluation, e));
-    let noise = noise.map(|found| found.doubt());
-    let preferred = preferred.map(|candidates| Doubt::Preferred {
-        candidates: candidates.ties(),
-    });
+    let best = candidates.and_then(Candidates::preferred);
     let jump = || {
         let found = connected_jump(problem, theta, evaluation).filter(|_| is_system);
         found.map(Doubt::RecordError)
     };
     let large = || large_error(problem, theta, evaluation).map(Doubt::RecordError);
-    let pulses = || {
-        let found = input_pulses(problem, theta, evaluation).filter(|_| is_system)?;
-        Some(Doubt::RecordError(or_jump(problem, found)))
+    let lacking = || {
+        let best = best?;
+        if let Some(e) = best.disturbed_experiment() {
+            let is_new = is_system && !plausibility.is_disturbed;
+            let found = is_new.then(|| Disturbance::of(problem, evaluation, e))??;
+            return Some(input_disturbance::doubt(&found));
+        }
+        match (best.input_pulses(), problem.experiments.first()) {
+            (Some((count, time, error)), Some(experiment)) => {
+                let found = RecordError::InputPulses {
+                    experiment: experiment.name.clone(),
+                    count,
+                    time,
+                    error,
+                };
+                is_system.then(|| Doubt::RecordError(or_jump(problem, found)))
+            }
+            _ => Some(Doubt::Preferred {
+                candidates: candidates?.ties(),
+            }),
+        }
     };
-    // A large gain that leaves white residuals explains all; a smaller one may be that of few samples of an input.
-    let best = candidates.and_then(Candidates::preferred);
-    let is_clear = best.is_some_and(|best| best.explains() && best.gain > LARGE_GAIN);
-    let (clear, other) = match is_clear {
-        true => (preferred, None),
-        false => (None, preferred),
-    };
-    let found = jump().or_else(large).or(clear).or_else(pulses);
-    found.or(other).or(noise)
+    jump().or_else(large).or_else(lacking)
 }

@@ -5,6 +5,7 @@ use super::input_correlation::coherent_residuals;
 use super::input_disturbance::input_warnings;
 use super::median_frequency::median_frequency;
 use super::step_check::{StepCheckOutcome, step_check};
+use crate::alternatives::POOR;
 use crate::diagnostics::{ResidualDiagnostics, rms};
 use crate::functions::CoefficientKind;
 use crate::noise::CorrelationLaw;
@@ -22,8 +23,6 @@ use std::f64::consts::{PI, TAU};
 const STEPPER: f64 = 0.1;
 /// NRMSE fit, per cent, below which a channel is unrelated to the model: residuals more than twice the variation of the samples.
 const UNRELATED: f64 = -100.0;
-/// NRMSE fit, per cent, below which a fit does not explain the record.
-pub const POOR: f64 = 90.0;
 /// Residuals of a channel over its stated sigma above which the two are inconsistent.
 pub const BEYOND_SIGMA: f64 = 3.0;
 /// Median of the size of a standard normal variable.

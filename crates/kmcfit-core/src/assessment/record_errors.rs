@@ -1,17 +1,15 @@
 //! Errors of a record that no parameter of the model explains: a delay between input and response, clocks that run at different rates, an
 //! input of the wrong sign, and a channel off by a factor.
 //!
-//! Small errors are further candidates of the [score tests](super::score_statistics); large ones are found by a search from which a refit starts. An
-//! error is named where a refit with it explains the residuals.
+//! Small errors are [candidates](crate::candidates); large ones are found by a search from which a refit starts. An error is named where a
+//! refit with it explains the residuals.
 
 use super::at_once;
-use super::plausibility::POOR;
 use super::record_error::RecordError;
-use super::record_parameters::{
-    Clock, RecordColumns, RecordParameter, on_clock, predict, with_clock, with_gain,
+use crate::alternatives::{
+    Clock, POOR, RecordParameter, Refit, on_best_clock, on_clock, predict, with_clock, with_gain,
+    without_correlation, worst_fit,
 };
-use super::refit::{Refit, without_correlation, worst_fit};
-use super::span::Span;
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -19,10 +17,6 @@ use crate::signal::{Spectrum, median_spacing};
 use crate::simd::sum::rms;
 use crate::threads::{analyses_at_once, map};
 
-/// Rounds of refits with a corrected clock.
-const ROUNDS: usize = 8;
-/// Change of a delay or rate in standard errors at which the rounds end.
-const AT_REST: f64 = 0.1;
 /// Share of a record over which clocks are taken as equal in the search for their rate.
 const BEGINNING: f64 = 0.2;
 /// Distance of the rates and delays that are tried, in periods at the end of the record.
@@ -70,38 +64,6 @@ fn factor(problem: &Problem, e: usize, c: usize, gain: f64) -> RecordError {
         factor: gain,
         beside_others: experiment.channels.len() > 1,
     }
-}
-
-/// Refits on the clock that a score test of its parameter leaves at rest.
-pub(crate) fn on_best_clock(
-    problem: &Problem,
-    theta: &[f64],
-    parameter: RecordParameter,
-    mut clock: Clock,
-) -> Option<(Clock, Refit)> {
-    let (RecordParameter::Delay(e) | RecordParameter::Rate(e)) = parameter else {
-        return None;
-    };
-    let mut start = theta.to_vec();
-    let mut found = None;
-    for _ in 0..ROUNDS {
-        let refit = Refit::of(with_clock(problem, e, clock)?, &start)?;
-        start.clone_from(&refit.fit.best.parameters);
-        let evaluation = refit.evaluation();
-        let change = RecordColumns::of(&refit.problem, evaluation, &[parameter])
-            .column(&refit.problem, evaluation, parameter)
-            .and_then(|column| Span::score(&refit.problem, evaluation, column))
-            .filter(|(_, t)| t.abs() > AT_REST);
-        found = Some((clock, refit));
-        let Some((value, _)) = change else {
-            break;
-        };
-        match parameter {
-            RecordParameter::Delay(_) => clock.delay += value,
-            _ => clock.rate += value,
-        }
-    }
-    found
 }
 
 /// Refit with the gain of a channel estimated.

@@ -5,12 +5,12 @@
 
 use super::FitAssessment;
 use super::{Doubt, Unidentified};
-use crate::finding::Severity;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
 };
 use crate::problem::Problem;
 use crate::record::Channel;
+use crate::severity::Severity;
 use crate::signal::clipped;
 use crate::solvers::{Fit, Status};
 use serde::{Deserialize, Serialize};

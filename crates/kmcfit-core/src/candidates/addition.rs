@@ -1,8 +1,8 @@
 //! What may be added to a model, and the problem with it.
 
-use super::jump;
+use super::jump_basis;
 use super::second_mode::Mode;
-use crate::assessment::{RecordParameter, extended, finer_basis, with_functions};
+use crate::alternatives::{RecordParameter, extended, finer_basis, with_functions};
 use crate::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
 };
@@ -42,6 +42,15 @@ pub enum Addition {
     Disturbance {
         /// Index of the experiment.
         experiment: usize,
+    },
+    /// Errors of few samples of the measured force of the only record.
+    InputPulses {
+        /// Number of the samples.
+        count: usize,
+        /// Time of the largest error, s.
+        time: f64,
+        /// Recorded less true force there, N.
+        error: f64,
     },
     /// Cubic splines in place of lines between the samples of the inputs.
     CubicInputs,
@@ -92,6 +101,32 @@ pub(super) enum Family {
 }
 
 impl Addition {
+    /// True for one candidate with other values of what was searched.
+    pub(super) fn is_like(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Variation { function: f, .. }, Self::Variation { function: g, .. })
+            | (
+                Addition::FinerBasis { function: f, .. },
+                Addition::FinerBasis { function: g, .. },
+            )
+            | (Self::Jump { function: f, .. }, Addition::Jump { function: g, .. }) => f == g,
+            (
+                Addition::SecondMode {
+                    experiment: e,
+                    channel: c,
+                    ..
+                },
+                Addition::SecondMode {
+                    experiment: f,
+                    channel: d,
+                    ..
+                },
+            ) => (e, c) == (f, d),
+            (Self::InputPulses { .. }, Self::InputPulses { .. }) => true,
+            _ => self == other,
+        }
+    }
+
     pub(super) fn family(self, problem: &Problem) -> Family {
         let of_kind = |kind: CoefficientKind| match kind {
             CoefficientKind::DAMPING
@@ -108,7 +143,7 @@ impl Addition {
             Self::Record(RecordParameter::Delay(_) | RecordParameter::Rate(_))
             | Self::CubicInputs => Family::Timing,
             Self::Record(RecordParameter::Gain(..)) => Family::Factor,
-            Self::Disturbance { .. } => Family::Noise,
+            Self::Disturbance { .. } | Self::InputPulses { .. } => Family::Noise,
             Self::SensorCurve { .. } | Self::Tone { .. } | Self::SecondMode { .. } => {
                 Family::Frequency
             }
@@ -157,13 +192,14 @@ impl Addition {
                     problem,
                     theta,
                     function,
-                    jump::basis(&problem.system.grid, time)?,
+                    jump_basis::basis(&problem.system.grid, time)?,
                     start,
                 )
             }
             Self::Record(RecordParameter::Rate(_)) => None,
             Self::Record(parameter) => with_record(problem, theta, parameter, *further.first()?),
             Self::CubicInputs
+            | Self::InputPulses { .. }
             | Self::Disturbance { .. }
             | Self::SensorCurve { .. }
             | Self::Tone { .. }

@@ -3,23 +3,20 @@
 use super::Candidate;
 use super::addition::Addition;
 use super::estimates::estimates;
-use super::jump;
+use super::jump_basis::is_jump;
 use super::penalised_misfit::{Judged, Linearised};
-use super::second_mode::{Mode, ModeSamples};
-use crate::assessment::{
-    RecordColumns, Span, extended, finer_basis, record_parameters, with_functions,
-};
+use super::pulses::pulses;
+use super::record_columns::{Column, of_records, second_modes};
+use crate::alternatives::{Span, extended, finer_basis, with_functions};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::identifiability::Quantity;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::signal::Spectrum;
 use crate::simd::sum::rms;
 use crate::solvers::weighted_jacobian;
 use crate::structure::Law;
 use crate::threads::{analyses_at_once, map};
 use nalgebra::DVector;
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Forces that a model may lack.
@@ -36,15 +33,6 @@ const WIDTH: f64 = 0.01;
 const DEGREE: usize = 2;
 /// Cells of the record between which a jump is looked for.
 const CELLS: usize = 26;
-/// Frequencies of the mains, Hz.
-const MAINS: [f64; 2] = [50.0, 60.0];
-/// Peaks of the spectrum of the residuals that are looked at for a second mode, and distances from each, in spacings of frequencies.
-const PEAKS: usize = 3;
-const BESIDE_PEAK: [f64; 3] = [-0.4, 0.0, 0.4];
-/// Damping ratios of a second mode that are looked at.
-const RATIOS: [f64; 3] = [0.003, 0.01, 0.03];
-/// Fewest periods of a second mode in a record.
-const PERIODS: f64 = 4.0;
 
 /// A candidate of the linear stage.
 pub(super) struct LinearCandidate {
@@ -110,13 +98,6 @@ fn width(evaluation: &Evaluation) -> Option<f64> {
     Some(WIDTH * rms(&speeds)).filter(|width| *width > 0.0 && width.is_finite())
 }
 
-/// What is added, with the derivatives of the weighted residuals in its parameters, or with other residuals.
-struct Column {
-    addition: Addition,
-    columns: Vec<DVector<f64>>,
-    searched: usize,
-}
-
 /// The candidates of a problem with white noise at its least squares, judged.
 pub(super) fn linear_candidates(
     problem: &Problem,
@@ -130,6 +111,7 @@ pub(super) fn linear_candidates(
     all.extend(jumps(problem, evaluation, &span, &rest));
     all.extend(of_records(problem, evaluation));
     all.extend(second_modes(problem, evaluation, &span, &rest));
+    all.extend(pulses(problem, theta));
     let judged = map(all.len(), analyses_at_once(problem.sample_count()), |i| {
         linearised.with(&all[i].columns, all[i].searched)
     });
@@ -153,7 +135,7 @@ fn open_functions(problem: &Problem) -> impl Iterator<Item = (usize, &Coefficien
             || problem.jumps.iter().any(|j| j.function == *index);
         let grid = &problem.system.grid;
         let basis = function.basis.as_ref();
-        let is_open = basis.is_some_and(|basis| !jump::is_jump(grid, basis));
+        let is_open = basis.is_some_and(|basis| !is_jump(grid, basis));
         is_open && !is_penalised && function.prior.is_none()
     })
 }
@@ -302,161 +284,4 @@ fn jumps(
         })
     });
     each.collect()
-}
-
-/// Parameters of records, and what their sensors may add to the samples.
-fn of_records(problem: &Problem, evaluation: &Evaluation) -> Vec<Column> {
-    let parameters = record_parameters(problem);
-    let columns = RecordColumns::of(problem, evaluation, &parameters);
-    let of_parameters = parameters.iter().filter_map(|parameter| {
-        let column = columns.column(problem, evaluation, *parameter)?;
-        Some(Column {
-            addition: Addition::Record(*parameter),
-            columns: vec![DVector::from_vec(column)],
-            searched: 0,
-        })
-    });
-    let mut all: Vec<Column> = of_parameters.collect();
-    for (e, experiment) in problem.experiments.iter().enumerate() {
-        for c in 0..experiment.channels.len() {
-            let tones = MAINS.into_iter();
-            let tones = tones.map(|frequency| Addition::Tone {
-                experiment: e,
-                channel: c,
-                frequency,
-            });
-            let curve = Addition::SensorCurve {
-                experiment: e,
-                channel: c,
-            };
-            all.extend(tones.chain([curve]).map(|addition| Column {
-                addition,
-                columns: beside(problem, evaluation, &columns, addition),
-                searched: 0,
-            }));
-        }
-    }
-    all
-}
-
-/// Weighted columns of what a sensor adds to its samples: a tone, or a square and a cube of the response.
-pub(super) fn beside(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    columns: &RecordColumns,
-    addition: Addition,
-) -> Vec<DVector<f64>> {
-    let rows = |(e, c): (usize, usize), value: &dyn Fn(usize) -> f64| {
-        let count = problem.experiments[e].channels[c].len();
-        let own = (0..count).map(value).collect();
-        DVector::from_vec(columns.weighted(problem, (e, c), own))
-    };
-    match addition {
-        Addition::SensorCurve {
-            experiment: e,
-            channel: c,
-        } => {
-            let predicted = &evaluation.predictions[e][c];
-            let size = rms(predicted).max(f64::MIN_POSITIVE);
-            let powers = [2, 3].map(|power| rows((e, c), &|i| (predicted[i] / size).powi(power)));
-            powers.into()
-        }
-        Addition::Tone {
-            experiment: e,
-            channel: c,
-            frequency,
-        } => {
-            let times = problem.experiments[e].channels[c].times();
-            let phase = |i: usize| TAU * frequency * (times[i] - times[0]);
-            vec![
-                rows((e, c), &|i| phase(i).cos()),
-                rows((e, c), &|i| phase(i).sin()),
-            ]
-        }
-        _ => Vec::new(),
-    }
-}
-
-/// Weighted columns of a mode of a channel.
-pub(super) fn mode_columns(
-    problem: &Problem,
-    columns: &RecordColumns,
-    samples: &ModeSamples,
-    (e, c): (usize, usize),
-    mode: Mode,
-) -> Vec<DVector<f64>> {
-    let own = samples.columns(mode);
-    let weighted = own.column_iter().map(|column| {
-        let column = column.iter().copied().collect();
-        DVector::from_vec(columns.weighted(problem, (e, c), column))
-    });
-    weighted.collect()
-}
-
-/// The second mode in each channel that leaves the least squares.
-fn second_modes(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    span: &Span,
-    rest: &DVector<f64>,
-) -> Vec<Column> {
-    let columns = RecordColumns::of(problem, evaluation, &[]);
-    let mut all = Vec::new();
-    let mut rows = problem.channel_samples().into_iter();
-    for (e, experiment) in problem.experiments.iter().enumerate() {
-        for c in 0..experiment.channels.len() {
-            let Some(rows) = rows.next() else {
-                continue;
-            };
-            let Some(samples) = ModeSamples::of(problem, e, c) else {
-                continue;
-            };
-            let Some(spectrum) = Spectrum::of(&rest.as_slice()[rows], samples.spacing) else {
-                continue;
-            };
-            let mut best: Option<(f64, Mode, Vec<DVector<f64>>)> = None;
-            for mode in modes(&spectrum) {
-                let found = mode_columns(problem, &columns, &samples, (e, c), mode);
-                let gain = span.gain(&found, rest);
-                if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
-                    best = Some((gain, mode, found));
-                }
-            }
-            all.extend(best.map(|(_, mode, columns)| Column {
-                addition: Addition::SecondMode {
-                    experiment: e,
-                    channel: c,
-                    mode,
-                },
-                columns,
-                searched: 2,
-            }));
-        }
-    }
-    all
-}
-
-/// Modes at the highest peaks of a spectrum.
-fn modes(spectrum: &Spectrum) -> Vec<Mode> {
-    let resolution = spectrum.resolution();
-    let density: Vec<(f64, f64)> = spectrum
-        .frequencies()
-        .zip(spectrum.density().iter().copied())
-        .collect();
-    let is_peak = |i: usize| {
-        let at = |i: usize| density.get(i).map_or(0.0, |(_, d)| *d);
-        at(i) >= at(i.wrapping_sub(1)) && at(i) > at(i + 1)
-    };
-    let mut peaks: Vec<(f64, f64)> = (0..density.len())
-        .filter(|i| is_peak(*i) && density[*i].0 > PERIODS * resolution)
-        .map(|i| density[i])
-        .collect();
-    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut found = Vec::new();
-    for (peak, _) in peaks.into_iter().take(PEAKS) {
-        for apart in BESIDE_PEAK {
-            found.extend(RATIOS.map(|ratio| [peak + apart * resolution, ratio]));
-        }
-    }
-    found
 }

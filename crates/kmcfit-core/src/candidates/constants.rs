@@ -7,10 +7,10 @@
 //! k(t) ~ k + 3/4 k3 A^2 + 5/8 k5 A^4,    c(t) ~ c + 8/(3 pi) c2 w A + 4/pi F/(w A)
 //! ```
 
-use super::jump;
+use super::jump_basis::is_jump;
 use super::penalised_misfit::Linearised;
 use super::{Addition, Candidate, Candidates, GAIN};
-use crate::assessment::{Refit, with_functions};
+use crate::alternatives::{Refit, with_functions};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -79,9 +79,9 @@ fn constants(problem: &Problem, theta: &[f64]) -> Option<(Problem, Vec<f64>)> {
     let mut start = Vec::new();
     let mut list: Vec<CoefficientFunction> = Vec::new();
     for (f, own) in functions.iter().enumerate() {
-        let is_jump = (own.basis.as_ref()).is_some_and(|basis| jump::is_jump(grid, basis));
+        let jumps = (own.basis.as_ref()).is_some_and(|basis| is_jump(grid, basis));
         let is_whole = own.offset.iter().all(|known| *known == 0.0);
-        let is_varying = own.parameters() > 1 && is_whole && !is_jump;
+        let is_varying = own.parameters() > 1 && is_whole && !jumps;
         if is_varying {
             let level = median(&*values[f]);
             start.push(level);

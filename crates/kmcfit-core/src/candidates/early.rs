@@ -1,6 +1,6 @@
 //! Fits of the beginning of a record, whose phase is not lost where that of the whole is.
 
-use crate::assessment::Refit;
+use crate::alternatives::Refit;
 use crate::problem::Problem;
 
 /// Shares of a record that are fitted one after the other.

@@ -2,7 +2,7 @@
 
 use super::addition::Addition;
 use super::penalised_misfit::Judged;
-use crate::assessment::RecordParameter;
+use crate::alternatives::RecordParameter;
 use crate::functions::Ratio;
 use crate::identifiability::Quantity;
 use crate::problem::Problem;
@@ -45,9 +45,10 @@ pub(super) fn estimates(
             });
             ends.into()
         }
-        Addition::FinerBasis { .. } | Addition::CubicInputs | Addition::Disturbance { .. } => {
-            Vec::new()
-        }
+        Addition::FinerBasis { .. }
+        | Addition::CubicInputs
+        | Addition::Disturbance { .. }
+        | Addition::InputPulses { .. } => Vec::new(),
         Addition::Jump { function, time } => {
             let own = problem.functions.get(function);
             let first = problem.functions.ranges()[function].start;

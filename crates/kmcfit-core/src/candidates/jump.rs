@@ -3,14 +3,14 @@
 use super::COLOURED;
 use super::addition::Addition;
 use super::early;
+use super::found::{Found, plain};
+use super::jump_basis::node_time;
 use super::penalised_misfit::Linearised;
-use super::refits::{Found, plain};
-use crate::assessment::{Minimum, with_functions};
+use crate::alternatives::{Minimum, with_functions};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::problem::Problem;
 use crate::simd::sum::rms;
 use crate::solvers::weighted_jacobian;
-use crate::system::Grid;
 use nalgebra::{DMatrix, DVector};
 
 /// Most refits.
@@ -24,30 +24,6 @@ const CHANGES: [f64; 8] = [-0.4, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.4];
 /// Parts of a record, and ratio of mean squares, for that place.
 const WINDOWS: usize = 100;
 const DEPARTED: f64 = 4.0;
-
-/// The time of the node nearest to a time.
-pub(super) fn node_time(grid: &Grid, time: f64) -> f64 {
-    grid.start() + ((time - grid.start()) / grid.step()).round() * grid.step()
-}
-
-/// Cells before and after a jump, and that of the node at it: its value, between those before and after, states the time within the step.
-pub(super) fn basis(grid: &Grid, time: f64) -> Option<Basis> {
-    let (middle, half) = (node_time(grid, time), 0.5 * grid.step());
-    let (start, end) = (grid.start(), grid.start() + grid.duration());
-    let knots = vec![start, middle - half, middle + half, end];
-    (knots.is_sorted_by(|a, b| a < b)).then_some(Basis::PiecewiseConstant { knots })
-}
-
-/// True for the basis of a jump.
-pub(super) fn is_jump(grid: &Grid, basis: &Basis) -> bool {
-    match basis {
-        Basis::PiecewiseConstant { knots } => match knots.as_slice() {
-            [_, a, b, _] => b - a < 1.5 * grid.step(),
-            _ => false,
-        },
-        _ => false,
-    }
-}
 
 /// Refit with a jump that begins at `time`, with this change; where it leaves residuals far from white also from where the response leaves that
 /// of the beginning.

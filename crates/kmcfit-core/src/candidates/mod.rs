@@ -13,15 +13,21 @@ mod columns;
 mod constants;
 mod early;
 mod estimates;
+mod found;
 mod jump;
+mod jump_basis;
 mod penalised_misfit;
+mod predictions;
+mod pulses;
+mod record_columns;
 mod refits;
 mod second_mode;
 mod words;
 
+pub use crate::alternatives::RecordParameter;
 pub use addition::Addition;
 
-use crate::assessment::{Disturbance, Refit, applies, uncorrelated, with_cubic_inputs};
+use crate::alternatives::{Disturbance, Refit, applies, uncorrelated, with_cubic_inputs};
 use crate::identifiability::Quantity;
 use crate::number_format::number_or_nan;
 use crate::objective::Evaluation;
@@ -78,6 +84,14 @@ impl Candidate {
     pub fn has_second_mode(&self) -> bool {
         let mut additions = self.additions.iter();
         additions.any(|addition| matches!(addition, Addition::SecondMode { .. }))
+    }
+
+    /// Number, time (s) and largest error (N) of wrong samples of the measured force.
+    pub(crate) fn input_pulses(&self) -> Option<(usize, f64, f64)> {
+        match self.additions.as_slice() {
+            [Addition::InputPulses { count, time, error }] => Some((*count, *time, *error)),
+            _ => None,
+        }
     }
 
     /// The experiment whose input has a disturbance, which is noise: a fit may have it beside the right model.
@@ -151,7 +165,7 @@ impl Candidates {
         list.extend(disturbances);
         for candidate in &linear {
             let is_same = |known: &Candidate| match known.additions.as_slice() {
-                [only] => refits::same(*only, candidate.addition),
+                [only] => only.is_like(candidate.addition),
                 _ => false,
             };
             if !list.iter().any(is_same) {
@@ -198,7 +212,7 @@ impl Candidates {
         };
         let has = |candidate: &Candidate, addition: &Addition| {
             let mut own = candidate.additions.iter();
-            own.any(|own| refits::same(*own, *addition))
+            own.any(|own| own.is_like(*addition))
         };
         let is_more = |candidate: &Candidate| {
             candidate.additions.len() > best.additions.len()
@@ -273,8 +287,9 @@ fn disturbances(problem: &Problem, evaluation: &Evaluation, own: &Judged) -> Vec
     each.collect()
 }
 
-/// Those that were refitted come before the others.
+/// Those that were refitted come before the others; wrong samples of a force need no refit.
 fn best_first(a: &Candidate, b: &Candidate) -> Ordering {
-    let is_judged = b.is_refitted.cmp(&a.is_refitted);
+    let is_judged = |c: &Candidate| c.is_refitted || c.input_pulses().is_some();
+    let is_judged = is_judged(b).cmp(&is_judged(a));
     is_judged.then(b.gain.total_cmp(&a.gain))
 }

@@ -9,7 +9,7 @@
 //! Schwarz (1978) with noise that each model has for itself. A model that leaves correlated residuals pays for their process, and one that leaves
 //! white ones does not.
 
-use crate::assessment::{Minimum, weighted_residuals};
+use crate::alternatives::{Minimum, weighted_residuals};
 use crate::noise::{Correlation, CorrelationLaw, select_order, uninterrupted_runs};
 use crate::objective::Evaluation;
 use crate::problem::Problem;

@@ -1,82 +1,27 @@
 //! Refits of the most promising candidates.
 
+use super::COLOURED;
 use super::addition::{Addition, Family};
-use super::columns::{LinearCandidate, mode_columns};
+use super::columns::LinearCandidate;
 use super::early;
-use super::estimates::estimates;
+use super::found::{Found, plain};
 use super::jump;
 use super::penalised_misfit::{Judged, Linearised};
-use super::second_mode::{Mode, ModeSamples};
-use super::{COLOURED, Candidate};
-use crate::assessment::{
-    Clock, RecordColumns, RecordParameter, Refit, on_best_clock, with_samples_of,
-};
+use super::predictions;
+use crate::alternatives::{Clock, RecordParameter, Refit, on_best_clock, with_samples_of};
 use crate::problem::Problem;
 use crate::simd::sum::rms;
 use crate::threads::{analyses_at_once, map};
-use nalgebra::DVector;
 
 /// Number of candidates with the lowest penalised misfit, and with the least squares, that are refitted.
 const LOWEST: usize = 3;
 const LEAST_SQUARES: usize = 2;
 /// Most refits.
 const MOST: usize = 12;
-/// Iteration limit of a refit: those that explain the residuals take at most half as many, others approach a poor minimum in small steps.
-const ITERATIONS: u64 = 40;
 /// Degrees of the polynomials of a function that varies, each refitted from the one before.
 const DEGREES: [usize; 4] = [1, 2, 4, 8];
 /// Most halvings of the intervals of a basis.
 const MOST_HALVINGS: usize = 3;
-/// Rounds of a refit with what is added to predictions, and change of the sum of squares at which they end.
-const ROUNDS: usize = 12;
-const AT_REST: f64 = 1e-8;
-/// Relative change of a frequency or a ratio for derivatives.
-const SMALL: f64 = 1e-4;
-/// Largest change of the logarithm of a frequency and a ratio in a round.
-const FARTHEST: [f64; 2] = [0.02, 0.7];
-
-/// Result of a refit.
-pub(super) struct Found {
-    pub(super) additions: Vec<Addition>,
-    pub(super) judged: Judged,
-    /// Parameters at the end of the search.
-    pub(super) theta: Vec<f64>,
-    /// Number of parameters beyond those of the model.
-    parameters: usize,
-    /// Functions and scalars by name with their parameters.
-    named: Vec<(String, Vec<f64>)>,
-}
-
-impl Found {
-    /// As a candidate beside a model with a penalised misfit.
-    pub(super) fn candidate(self, problem: &Problem, misfit: f64) -> Candidate {
-        let changes = self.judged.estimate.as_slice();
-        let starts = self.theta.iter().copied().chain(std::iter::repeat(0.0));
-        let mut at: Vec<f64> = starts.zip(changes).map(|(a, d)| a + d).collect();
-        at.extend(self.theta.iter().skip(at.len()));
-        let estimates = match self.additions.as_slice() {
-            [only] => estimates(*only, problem, &at, &self.judged),
-            _ => Vec::new(),
-        };
-        let names = self.additions.iter().map(|a| a.name(problem));
-        let candidate = Candidate {
-            name: names.collect::<Vec<String>>().join(" and "),
-            words: String::new(),
-            estimates,
-            to_constants: false,
-            gain: misfit - self.judged.misfit,
-            parameters: self.parameters,
-            order: self.judged.order,
-            is_refitted: true,
-            parameters_by_name: self.named,
-            additions: self.additions,
-        };
-        Candidate {
-            words: candidate.in_words(problem),
-            ..candidate
-        }
-    }
-}
 
 /// Refits of the most promising candidates, and in free decays of pairs.
 pub(super) fn refits(
@@ -139,28 +84,6 @@ fn pairs(
     found.into_iter().flatten().collect()
 }
 
-/// True for one candidate with other values of what was searched.
-pub(super) fn same(a: Addition, b: Addition) -> bool {
-    match (a, b) {
-        (Addition::Variation { function: f, .. }, Addition::Variation { function: g, .. })
-        | (Addition::FinerBasis { function: f, .. }, Addition::FinerBasis { function: g, .. })
-        | (Addition::Jump { function: f, .. }, Addition::Jump { function: g, .. }) => f == g,
-        (
-            Addition::SecondMode {
-                experiment: e,
-                channel: c,
-                ..
-            },
-            Addition::SecondMode {
-                experiment: f,
-                channel: d,
-                ..
-            },
-        ) => (e, c) == (f, d),
-        _ => a == b,
-    }
-}
-
 /// The candidates with the lowest penalised misfit and the least squares, with their families.
 fn chosen<'a>(
     problem: &Problem,
@@ -186,7 +109,7 @@ fn chosen<'a>(
     for candidate in firsts.into_iter().chain(of_families) {
         if !all
             .iter()
-            .any(|known| same(known.addition, candidate.addition))
+            .any(|known| known.addition.is_like(candidate.addition))
         {
             all.push(candidate);
         }
@@ -225,29 +148,9 @@ fn refitted(
             experiment,
             channel,
             ..
-        } => beside(problem, theta, addition, (experiment, channel)),
+        } => predictions::refit(problem, theta, addition, (experiment, channel)),
         _ => plain(problem, theta, addition, further),
     }
-}
-
-/// Refit of a changed problem.
-pub(super) fn plain(
-    problem: &Problem,
-    theta: &[f64],
-    addition: Addition,
-    further: &[f64],
-) -> Option<Found> {
-    let (changed, start) = addition.added(problem, theta, further)?;
-    let parameters = changed.parameters() - problem.parameters();
-    let refit = Refit::within(ITERATIONS, changed, &start)?;
-    let judged = Linearised::at(&refit.problem, refit.evaluation()).own();
-    Some(Found {
-        additions: vec![addition],
-        named: refit.problem.functions.named(&refit.fit.best.parameters),
-        judged,
-        theta: refit.fit.best.parameters,
-        parameters,
-    })
 }
 
 /// Refits with polynomials of higher and higher degree, as long as these are better; where they leave residuals far from white also from the
@@ -368,103 +271,4 @@ fn clock(
         named: Vec::new(),
         parameters: 1,
     })
-}
-
-/// Refit with what is added to the predictions of a channel.
-fn beside(
-    problem: &Problem,
-    theta: &[f64],
-    addition: Addition,
-    (e, c): (usize, usize),
-) -> Option<Found> {
-    let mut theta = theta.to_vec();
-    let count = theta.len();
-    let mut evaluation = problem.evaluate(&theta).ok()?;
-    let samples = ModeSamples::of(problem, e, c);
-    let mut mode = match addition {
-        Addition::SecondMode { mode, .. } => mode,
-        _ => [0.0; 2],
-    };
-    let mut before = f64::INFINITY;
-    let mut best: Option<Found> = None;
-    for _ in 0..ROUNDS {
-        let columns = RecordColumns::of(problem, &evaluation, &[]);
-        let further = |mode: Mode| -> Option<Vec<DVector<f64>>> {
-            match addition {
-                Addition::SecondMode { .. } => Some(mode_columns(
-                    problem,
-                    &columns,
-                    samples.as_ref()?,
-                    (e, c),
-                    mode,
-                )),
-                _ => Some(super::columns::beside(
-                    problem,
-                    &evaluation,
-                    &columns,
-                    addition,
-                )),
-            }
-        };
-        let linearised = Linearised::at(problem, &evaluation);
-        let mut own = further(mode)?;
-        let factors = own.len();
-        if let Addition::SecondMode { .. } = addition {
-            let judged = linearised.squares_with(&own);
-            let values = &judged.as_slice()[count..];
-            let sum = |columns: &[DVector<f64>]| {
-                let mut sum = DVector::zeros(linearised.residuals.len());
-                columns
-                    .iter()
-                    .zip(values)
-                    .for_each(|(column, value)| sum.axpy(*value, column, 1.0));
-                sum
-            };
-            let here = sum(&own);
-            for j in 0..2 {
-                let mut moved = mode;
-                moved[j] *= 1.0 + SMALL;
-                own.push((sum(&further(moved)?) - &here) / SMALL);
-            }
-        }
-        let judged = linearised.with(&own, 0);
-        let squares = judged.squares;
-        if !squares.is_finite() || squares > before {
-            break;
-        }
-        let is_at_rest = squares > (1.0 - AT_REST) * before;
-        before = squares;
-        let change = judged.change.clone();
-        let parameters = own.len();
-        best = Some(Found {
-            additions: vec![match addition {
-                Addition::SecondMode { .. } => Addition::SecondMode {
-                    experiment: e,
-                    channel: c,
-                    mode,
-                },
-                other => other,
-            }],
-            judged,
-            theta: theta.clone(),
-            named: Vec::new(),
-            parameters,
-        });
-        if is_at_rest {
-            break;
-        }
-        if let Addition::SecondMode { .. } = addition {
-            for j in 0..2 {
-                let step = change[count + factors + j].clamp(-FARTHEST[j], FARTHEST[j]);
-                mode[j] *= step.exp();
-            }
-            (mode.iter().all(|x| x.is_finite() && *x > 0.0) && mode[1] < 1.0).then_some(())?;
-        }
-        theta
-            .iter_mut()
-            .zip(change.as_slice())
-            .for_each(|(a, d)| *a += d);
-        evaluation = problem.evaluate(&theta).ok()?;
-    }
-    best
 }

@@ -2,7 +2,7 @@
 
 use super::Candidate;
 use super::addition::Addition;
-use crate::assessment::RecordParameter;
+use crate::alternatives::RecordParameter;
 use crate::identifiability::Quantity;
 use crate::number_format::{and_list, significant};
 use crate::problem::Problem;
@@ -29,6 +29,7 @@ impl Addition {
                     None => format!("{name} of {}", problem.experiments[e].name),
                 }
             }
+            Self::InputPulses { .. } => "wrong samples of the force".to_owned(),
             Self::CubicInputs => "cubic interpolation of the inputs".to_owned(),
             Self::Disturbance { experiment: e } => {
                 format!("disturbance of {}", problem.experiments[e].name)
@@ -97,6 +98,13 @@ impl Addition {
                     format!("a drift of the {}{}", channel(problem, e, c), of(0))
                 }
             },
+            Self::InputPulses { count: 1, time, .. } => {
+                format!("a wrong sample of the force at {} s", significant(time, 4))
+            }
+            Self::InputPulses { count, time, .. } => format!(
+                "{count} wrong samples of the force, the largest error at {} s",
+                significant(time, 4)
+            ),
             Self::CubicInputs => "cubic splines between the samples of the inputs".to_owned(),
             Self::Disturbance { .. } => {
                 "a disturbance that enters through the equation of motion".to_owned()

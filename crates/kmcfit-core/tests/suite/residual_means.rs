@@ -3,9 +3,10 @@
 
 use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
-use kmcfit_core::assessment::{Doubt, FitAssessment, RecordParameter};
+use kmcfit_core::assessment::{Doubt, FitAssessment};
 use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::candidates::Addition;
+use kmcfit_core::candidates::RecordParameter;
 use kmcfit_core::model::{CoefficientSpec, ScalarSpec, SensorSpec};
 use kmcfit_core::problem::Problem;
 use kmcfit_core::record::{ChannelKind, Weighting};

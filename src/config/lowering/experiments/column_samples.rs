@@ -5,12 +5,12 @@ use super::data_facts::{FIRST, MEAN, MERGED, MOST_PATHS, RecordNotes, fact};
 use super::unit::QuantityColumn;
 use crate::config::lowering::ModelKey;
 use crate::error::{InputError, Location};
-use crate::finding::Finding;
 use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, lines_in_words,
     repeated_times, sample_rates, without_rounding,
 };
 use crate::units::{Measurand, Unit};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::model::{
     ColumnId, ColumnRef, DecimalSign, Delimiter, ExperimentSpec, OneOrList, ScalarOr, SourceSpec,
 };

@@ -3,11 +3,11 @@
 use super::{Entry, RawChannel, RawRecord, is_equation_error, sensor_of};
 use crate::config::ModelFile;
 use crate::config::dominant::Oscillation;
-use crate::finding::Finding;
 use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use crate::tables::codes_of_column;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::{detrended, outlier_indices, standard_deviation};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::model::{ExperimentSpec, InitialSpec, KnownValue, ScalarSpec};
 use kmcfit_core::number_format::significant;

@@ -2,8 +2,8 @@
 
 use crate::config::ModelFile;
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::tables::{Table, TableFormat};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::number_format::{count as counted, significant};
 use serde::Serialize;

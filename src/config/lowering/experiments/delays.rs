@@ -3,7 +3,7 @@
 use super::data_facts::{RecordNotes, time};
 use super::{Entry, RawRecord};
 use crate::error::InputError;
-use crate::finding::Finding;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::model::{DelayValue, ExperimentSpec, InputSensorSpec};
 use kmcfit_core::number_format::significant;
 use kmcfit_core::record::{ChannelKind, Weighting};

@@ -6,10 +6,10 @@ use super::data_facts::{
     Action, EXCLUDED, GapLocation, INTERPOLATED, MISSING, MOST_PATHS, RecordNotes, USED, fact,
     gaps_in_words, spans_in_words, time, times_in_words,
 };
-use crate::finding::Finding;
 use crate::units::Unit;
 use kmcfit_core::assessment::Doubt;
 use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::model::FaultName;
 use kmcfit_core::number_format::{count as counted, significant};

@@ -14,7 +14,6 @@ use super::{BuildMode, functions};
 use crate::config::ModelFile;
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 pub(in crate::config) use channel::sensor_of;
@@ -22,6 +21,7 @@ pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
 pub(in crate::config) use excitation::known_stretches;
 use kmcfit_core::builder::{ChannelSpec, Record, listed};
+use kmcfit_core::finding::Finding;
 use kmcfit_core::functions::ScalarParameter;
 use kmcfit_core::model::{
     DelayValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec, ScalarSpec,

@@ -3,7 +3,7 @@
 use super::{Entry, RawChannel, RawRecord};
 use crate::config::ModelFile;
 use crate::error::InputError;
-use crate::finding::Finding;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::model::ColumnRef;
 

@@ -2,10 +2,10 @@
 
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::tables::Table;
 use crate::units::{Measurand, ScaledUnit, Unit};
 use kmcfit_core::assessment::Doubt;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use serde_json::json;
 

@@ -10,7 +10,7 @@
 
 use super::FinerNodes;
 use crate::config::lowering::experiments::RawRecord;
-use crate::finding::Finding;
+use kmcfit_core::finding::Finding;
 use kmcfit_core::number_format::significant;
 use kmcfit_core::signal::Spectrum;
 use kmcfit_core::system::Method;

@@ -1,7 +1,7 @@
 //! Numbers of nodes of automatic grids that are finer than the first one.
 
 use crate::config::lowering::experiments::RawRecord;
-use crate::finding::Finding;
+use kmcfit_core::finding::Finding;
 
 /// Most nodes per sample of a refined grid with a stated `auto`, and of one without a statement; the first one has fewer
 /// ([`super::auto`]).

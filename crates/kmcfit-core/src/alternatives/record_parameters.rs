@@ -243,7 +243,7 @@ fn slopes(
 }
 
 /// Predictions of a channel by the response of an evaluation.
-pub(super) fn predict(
+pub(crate) fn predict(
     problem: &Problem,
     evaluation: &Evaluation,
     e: usize,
@@ -261,7 +261,7 @@ pub(super) fn predict(
 
 /// A channel with the times of its samples on another clock, without the samples before or after the response; `None` for a sensor of
 /// absolute motion, and for weights or filters that do not allow it.
-pub(super) fn on_clock(
+pub(crate) fn on_clock(
     experiment: &Experiment,
     channel: &Channel,
     grid: &Grid,
@@ -334,7 +334,7 @@ pub(crate) fn with_samples_of(problem: &Problem, e: usize, clock: Clock) -> Opti
 }
 
 /// The problem with the channels of an experiment on another clock, and white noise.
-pub(super) fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
+pub(crate) fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
     let experiment = &problem.experiments[e];
     let grid = &problem.system.grid;
     let channels = experiment.channels.iter();
@@ -350,7 +350,7 @@ pub(super) fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Pr
 }
 
 /// The problem with the gain of a channel estimated, as the last scalar.
-pub(super) fn with_gain(problem: &Problem, e: usize, c: usize, start: f64) -> Option<Problem> {
+pub(crate) fn with_gain(problem: &Problem, e: usize, c: usize, start: f64) -> Option<Problem> {
     let mut scalars = problem.functions.scalars().to_vec();
     let index = scalars.len();
     scalars.push(ScalarParameter {

@@ -28,7 +28,7 @@ pub(crate) struct Span {
 
 impl Span {
     /// Estimate of a parameter with the derivatives `column` beside those of the model, and its ratio to the standard error.
-    pub(super) fn score(
+    pub(crate) fn score(
         problem: &Problem,
         evaluation: &Evaluation,
         column: Vec<f64>,
@@ -69,14 +69,14 @@ impl Span {
     }
 
     /// Leaves the parts of the columns orthogonal to the derivatives of the model.
-    pub(super) fn make_orthogonal(&self, columns: &mut DMatrix<f64>) {
+    pub(crate) fn make_orthogonal(&self, columns: &mut DMatrix<f64>) {
         let shares = self.basis.tr_mul(columns);
         columns.gemm(-1.0, &self.basis, &shares, 1.0);
     }
 
     /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error; `e` is the part of the residuals
     /// orthogonal to the derivatives of the model.
-    pub(super) fn test(
+    pub(crate) fn test(
         &self,
         problem: &Problem,
         column: DVector<f64>,

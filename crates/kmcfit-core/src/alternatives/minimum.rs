@@ -5,7 +5,7 @@ use crate::simd::tall_qr::Triangle;
 use nalgebra::{DMatrix, DVector};
 
 /// Root `F` of `(J^T J)^-1 = F F^T` on the combinations of parameters that `J` determines, with columns of unit length for the decision.
-pub(super) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     let mut scaled = match jacobian.nrows() > jacobian.ncols() {
         true => Triangle::factor(jacobian),
         false => jacobian.clone(),

@@ -10,13 +10,10 @@
 //! is removed from the residuals `e` until no score is significant (orthogonal matching pursuit, Pati et al. 1993). Few pulses that leave no
 //! significant one explain the residuals; a missing term or a varying coefficient leaves many.
 
-use super::extension::extended;
-use super::input_correlation::measured;
-use super::record_error::RecordError;
-use super::refinement::applies;
-use super::span::{Span, weighted_residuals};
+use super::addition::Addition;
+use super::record_columns::Column;
+use crate::alternatives::{Span, extended, measured, weighted_residuals};
 use crate::functions::{CoefficientFunction, CoefficientKind};
-use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::signal::Signal;
 use crate::solvers::weighted_jacobian;
@@ -40,11 +37,7 @@ const APART: f64 = 1e-3;
 
 /// The errors of few samples of the force that explain the residuals of a problem with one record; `None` where there are none, for a long
 /// record, and with a static force or a stated error of the input.
-pub(super) fn input_pulses(
-    problem: &Problem,
-    theta: &[f64],
-    evaluation: &Evaluation,
-) -> Option<RecordError> {
+pub(super) fn pulses(problem: &Problem, theta: &[f64]) -> Option<Column> {
     let [experiment] = problem.experiments.as_slice() else {
         return None;
     };
@@ -57,7 +50,6 @@ pub(super) fn input_pulses(
     let is_short = nodes.saturating_mul(count) <= MOST_DERIVATIVES;
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     (is_force && !has_static_force && is_short && is_few).then_some(())?;
-    applies(problem, theta, evaluation).then_some(())?;
     let pulses = CoefficientFunction::nodal(CoefficientKind::STATIC_FORCE, vec![0.0; nodes]);
     let (extended, at) = extended(problem, theta, vec![(pulses, Law::Offset)])?;
     let evaluation = extended.evaluate(&at).ok()?;
@@ -76,7 +68,7 @@ pub(super) fn input_pulses(
     let residuals = model.orthogonal(weighted_residuals(&extended, &evaluation));
     let found = pursuit(
         &model,
-        by_sample,
+        by_sample.clone(),
         residuals,
         own.len(),
         &peaks(signal.values()),
@@ -85,11 +77,18 @@ pub(super) fn input_pulses(
         .iter()
         .copied()
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    Some(RecordError::InputPulses {
-        experiment: experiment.name.clone(),
-        count: found.len(),
-        time: *signal.times().get(sample)?,
-        error,
+    let peaks = peaks(signal.values());
+    let is_peak = found.len() == 1 && peaks.iter().any(|(peak, _)| *peak == sample);
+    let columns = found.iter().map(|(j, _)| by_sample.column(*j).into_owned());
+    Some(Column {
+        addition: Addition::InputPulses {
+            count: found.len(),
+            time: *signal.times().get(sample)?,
+            error,
+        },
+        columns: columns.collect(),
+        // A peak is one of few places.
+        searched: if is_peak { 0 } else { found.len() },
     })
 }
 

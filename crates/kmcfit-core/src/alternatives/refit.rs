@@ -1,16 +1,17 @@
 //! Refits of a changed problem, and the test whether they explain the residuals.
 
-use super::plausibility::POOR;
 use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, NoiseEstimate};
 use crate::simd::sum::rms;
 use crate::solvers::{Fit, FitSettings, Stopping, fit_from};
 
+/// NRMSE fit, per cent, below which a fit does not explain the record.
+pub const POOR: f64 = 90.0;
 /// Smallest p-value of the test of whiteness of residuals that a change explains.
 const WHITE: f64 = 1e-3;
 /// Ratio of the residuals with and without an error below which it explains them although they are not white.
-pub(super) const EXPLAINED: f64 = 0.5;
+pub(crate) const EXPLAINED: f64 = 0.5;
 
 /// Iteration limit of a refit. Those that explain the residuals of the tests' records take at most 23; others approach a poor minimum in
 /// a thousand small steps.
@@ -45,37 +46,37 @@ impl Refit {
     }
 
     /// True if the residuals of all channels are white.
-    pub(super) fn is_white(&self) -> bool {
+    pub(crate) fn is_white(&self) -> bool {
         is_white(&self.problem, self.evaluation())
     }
 
     /// Largest root mean square of the residuals of a channel relative to its samples.
-    pub(super) fn worst_misfit(&self) -> f64 {
+    pub(crate) fn worst_misfit(&self) -> f64 {
         worst_misfit(&self.problem, self.evaluation())
     }
 
     /// True if the residuals are white, or small beside those of `before` where the fit is good.
-    pub(super) fn explains(&self, problem: &Problem, before: &Evaluation) -> bool {
+    pub(crate) fn explains(&self, problem: &Problem, before: &Evaluation) -> bool {
         let is_smaller = self.worst_misfit() < EXPLAINED * worst_misfit(problem, before);
         is_smaller && (self.is_white() || worst_fit(&self.problem, self.evaluation()) >= POOR)
     }
 }
 
 /// True if the residuals of all channels are white.
-pub(super) fn is_white(problem: &Problem, evaluation: &Evaluation) -> bool {
+pub(crate) fn is_white(problem: &Problem, evaluation: &Evaluation) -> bool {
     let mut each = problem.predicted(evaluation);
     each.all(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value >= WHITE)
 }
 
 /// Fit of the worst channel, per cent.
-pub(super) fn worst_fit(problem: &Problem, evaluation: &Evaluation) -> f64 {
+pub(crate) fn worst_fit(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let fits = (problem.predicted(evaluation))
         .map(|(channel, predicted)| channel_fit_percent(channel, predicted));
     fits.fold(100.0, f64::min)
 }
 
 /// Largest root mean square of the residuals of a channel relative to its samples.
-pub(super) fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
+pub(crate) fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let each = problem.predicted(evaluation).map(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         rms(&residuals) / rms(channel.observed())
@@ -91,7 +92,7 @@ pub(crate) fn uncorrelated(problem: &Problem) -> Problem {
 }
 
 /// Sets white noise for all channels, beside the stated errors of an input.
-pub(super) fn without_correlation(experiments: &mut [Experiment]) {
+pub(crate) fn without_correlation(experiments: &mut [Experiment]) {
     let is_stated = |c: &Channel| (c.correlation()).is_some_and(|c| c.input_errors().is_some());
     let channels = experiments.iter_mut().flat_map(|e| &mut e.channels);
     for channel in channels.filter(|c| !is_stated(c)) {

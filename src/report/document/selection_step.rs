@@ -1,0 +1,20 @@
+//! Steps of `fit --select`.
+
+use serde::{Deserialize, Serialize};
+
+/// One addition to the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SelectionStep {
+    /// What was added, in words.
+    pub added: String,
+    /// Its gain.
+    pub gain: f64,
+    /// Overrides of the model file that add it.
+    pub set: Vec<String>,
+    /// Natural frequency before and after, Hz; absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub natural_frequency: Option<[f64; 2]>,
+    /// Damping ratio before and after.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damping_ratio: Option<[f64; 2]>,
+}
