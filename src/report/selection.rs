@@ -59,10 +59,14 @@ pub fn select(file: &ModelFile, fit: CompletedFit, requested: RequestedFiles) ->
 
 /// The candidate that is preferred to the model of a document.
 fn preferred(document: &ResultDocument) -> Option<Candidate> {
-    document.doubts().find_map(|doubt| match doubt {
-        Doubt::Preferred { candidates } => candidates.first().cloned(),
-        _ => None,
-    })
+    let is_stated = document.doubts().any(|doubt| {
+        matches!(
+            doubt,
+            Doubt::Preferred { .. } | Doubt::DisturbedInput { .. }
+        )
+    });
+    let candidates = document.candidates.as_ref().filter(|_| is_stated);
+    candidates?.preferred().cloned()
 }
 
 fn with(
@@ -74,7 +78,14 @@ fn with(
     let overrides = Override::parse_all(&set).ok()?;
     let file = now.file.clone().with_overrides(&overrides).ok()?;
     let mut model = build(&file, BuildMode::Fit).ok()?;
-    let start = model.problem.functions.start_of(&best.parameters_by_name);
+    let named = match best.parameters_by_name.as_slice() {
+        [] => {
+            let before = &now.fit.fit.best.parameters;
+            &now.fit.model.problem.functions.named(before)
+        }
+        found => found,
+    };
+    let start = model.problem.functions.start_of(named);
     model.problem = (model.problem)
         .with(|parts| parts.functions.set_start(&start))
         .ok()?;

@@ -1,6 +1,6 @@
 //! The candidate that is preferred to the model as a change of the model file, or as what is to be measured.
 
-use super::records::about_delay;
+use super::records::{about_delay, about_disturbance};
 use super::{Step, Suggestion, written};
 use crate::config::Model;
 use crate::report::document::ResultDocument;
@@ -81,9 +81,30 @@ fn overrides(
         }
     }
     for addition in &candidate.additions {
-        all.push(change(*addition, candidate, document, model)?);
+        match addition {
+            Addition::Disturbance { experiment } => {
+                all.extend(noise_of_input(*experiment, candidate, document, model)?);
+            }
+            other => all.push(change(*other, candidate, document, model)?),
+        }
     }
     (!all.is_empty()).then_some(all)
+}
+
+/// Overrides that state the noise of a measured input.
+fn noise_of_input(
+    e: usize,
+    candidate: &Candidate,
+    document: &ResultDocument,
+    model: &Model,
+) -> Option<Vec<String>> {
+    let name = &document.experiments.get(e)?.name;
+    let sigma = candidate.estimates.first()?.value;
+    let input = input(model, e)?;
+    match about_disturbance(document, model, name, input.name(), sigma)?.step {
+        Step::Change(overrides) => Some(overrides),
+        _ => None,
+    }
 }
 
 fn change(

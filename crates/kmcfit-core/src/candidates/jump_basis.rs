@@ -3,6 +3,9 @@
 use crate::functions::Basis;
 use crate::system::Grid;
 
+/// Longest middle cell as a share of the record: that of a jump found on another grid.
+const SHORT: f64 = 0.01;
+
 /// The time of the node nearest to a time.
 pub(super) fn node_time(grid: &Grid, time: f64) -> f64 {
     grid.start() + ((time - grid.start()) / grid.step()).round() * grid.step()
@@ -20,7 +23,7 @@ pub(super) fn basis(grid: &Grid, time: f64) -> Option<Basis> {
 pub(super) fn is_jump(grid: &Grid, basis: &Basis) -> bool {
     match basis {
         Basis::PiecewiseConstant { knots } => match knots.as_slice() {
-            [_, a, b, _] => b - a < 1.5 * grid.step(),
+            [_, a, b, _] => b - a < (1.5 * grid.step()).max(SHORT * grid.duration()),
             _ => false,
         },
         _ => false,

@@ -266,7 +266,6 @@ fn disturbances(problem: &Problem, evaluation: &Evaluation, own: &Judged) -> Vec
             let first = channels;
             channels += experiment.channels.len();
             let own = own.of_channels.get(first..channels)?;
-            own.iter().any(|noise| noise.order > 0).then_some(())?;
             let found = Disturbance::of(problem, evaluation, e)?;
             let addition = Addition::Disturbance { experiment: e };
             Some(Candidate {

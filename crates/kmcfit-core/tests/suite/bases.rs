@@ -195,14 +195,22 @@ fn at_a_jump_the_side_after_counts_and_at_the_end_the_side_before() {
     let hats = Basis::PiecewiseLinear { knots };
     let slopes = apply(&hats.rows(&grid, &at, 1), &[0.0, 1.0, 3.0, 0.0]);
     assert_eq!(slopes, [1.0, 1.0, 2.0, -3.0, -3.0]);
-    // Node 10 differs from the knot 0.3 by a rounding error, and belongs to the cell after it.
+    // Node 10 differs from the knot 0.3 by a rounding error: at a node the value is the mean over the half steps beside it.
     let grid = Grid::new(0.0, 0.9, 31).unwrap();
     assert!(grid.time(10) != 0.3);
     let steps = Basis::PiecewiseConstant {
         knots: vec![0.0, 0.3, 0.9],
     };
     let values = steps.design(&grid).multiply(&[1.0, 2.0], 31);
-    assert_eq!((values[9], values[10]), (1.0, 2.0));
+    assert_eq!((values[9], values[11]), (1.0, 2.0));
+    assert!((values[10] - 1.5).abs() < 1e-12);
+    // A knot between nodes, at 0.005 s of a half step of 0.015 s after node 10: (1 * 0.02 + 2 * 0.01) / 0.03.
+    let steps = Basis::PiecewiseConstant {
+        knots: vec![0.0, 0.305, 0.9],
+    };
+    let values = steps.design(&grid).multiply(&[1.0, 2.0], 31);
+    assert_eq!((values[9], values[11]), (1.0, 2.0));
+    assert!((values[10] - 4.0 / 3.0).abs() < 1e-12);
 }
 
 /// The integral of the squared derivative by Simpson's rule on each cell, derivatives taken inside

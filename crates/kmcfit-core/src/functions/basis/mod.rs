@@ -41,7 +41,7 @@ pub enum Basis {
     Nodal,
     /// One value for all times.
     Constant,
-    /// One value per cell between two knots; at an inner knot the value of the cell after it.
+    /// One value per cell between two knots; at an inner knot the value of the cell after it, at a node the mean over the half steps beside it.
     PiecewiseConstant {
         /// Times in s at which the value may jump, and both ends.
         knots: Vec<f64>,
@@ -112,13 +112,18 @@ impl Basis {
         }
     }
 
-    /// Design matrix `B_ij = b_j(t_i)` at the nodes, `nodes x parameters`; dimensionless.
+    /// Design matrix `B_ij = b_j(t_i)` at the nodes, `nodes x parameters`; dimensionless. For cells the mean of `b_j` over the half steps beside
+    /// the node.
     pub fn design(&self, grid: &Grid) -> Design {
         match self {
             Basis::Nodal => Design::Identity,
             Basis::Constant => Design::Constant {
                 nodes: grid.nodes(),
             },
+            Basis::PiecewiseConstant { knots } => {
+                let cells = piecewise_constant::PiecewiseConstant::new(knots);
+                Design::Sparse(Arc::new(cells.at_nodes(grid)))
+            }
             _ => Design::Sparse(Arc::new(local(self.on(grid).as_ref(), grid))),
         }
     }
