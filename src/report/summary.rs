@@ -79,7 +79,7 @@ fn assumed(document: &ResultDocument, is_meant: impl Fn(&Doubt) -> bool) -> Vec<
 }
 
 /// What `--select` added, with its gain.
-fn additions(document: &ResultDocument) -> Vec<String> {
+pub(in crate::report) fn additions(document: &ResultDocument) -> Vec<String> {
     let steps = document.selection.iter();
     let each = steps.map(|step| format!("{} (gain {})", step.added, significant(step.gain, 2)));
     each.collect()

@@ -8,10 +8,11 @@ use kmcfit_core::assessment::{
     Doubt, Estimate, EstimateStatus, Implausible, VerdictLevel, estimates, verdict_assumptions,
     verdict_reasons,
 };
-use kmcfit_core::diagnostics::standard_deviation;
+use kmcfit_core::diagnostics::{SIGNIFICANCE, standard_deviation};
 use kmcfit_core::finding::Finding;
 use kmcfit_core::finding::Severity;
 use kmcfit_core::functions::Ratio;
+use kmcfit_core::number_format::significant;
 use kmcfit_core::solvers::{EquationBalance, Status};
 
 impl FittedModel<'_> {
@@ -164,6 +165,21 @@ impl FittedModel<'_> {
         Implausible::of(frequency, (!self.is_rotation()).then_some(response))
     }
 
+    /// Autocorrelation of the residuals that is no reason of the verdict.
+    fn autocorrelation(&self) -> String {
+        let tests = self.run_assessment.diagnostics.iter().flatten();
+        let least = tests
+            .map(|found| found.whiteness.p_value)
+            .fold(1.0, f64::min);
+        match least < SIGNIFICANCE {
+            true => format!(
+                "weak autocorrelation of the residuals (p = {})",
+                significant(least, 2)
+            ),
+            false => "no significant autocorrelation of the residuals".to_owned(),
+        }
+    }
+
     /// The tests that a fit without reasons passed.
     fn passed(&self) -> String {
         let problem = &self.model.problem;
@@ -174,9 +190,7 @@ impl FittedModel<'_> {
             _ => String::new(),
         };
         let residuals = match problem.channels().all(|c| c.weighting().is_sigma()) {
-            true => vec![format!(
-                "no significant autocorrelation of the residuals{noise}"
-            )],
+            true => vec![self.autocorrelation() + &noise],
             false => Vec::new(),
         };
         let assessment = self.run_assessment.assessment.as_ref();

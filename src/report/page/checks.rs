@@ -52,21 +52,14 @@ fn ladder(document: &ResultDocument) -> String {
     };
     let row = |(i, step): (usize, &SelectionStep)| {
         vec![
-            (i + 1).to_string(),
-            step.added.clone(),
+            format!("{}. {}", i + 1, step.added),
             short(step.gain),
             change(step.natural_frequency),
             change(step.damping_ratio),
         ]
     };
     let rows: Vec<Vec<String>> = document.selection.iter().enumerate().map(row).collect();
-    let headings = [
-        "step",
-        "added",
-        "gain",
-        "natural frequency (Hz)",
-        "damping ratio",
-    ];
+    let headings = ["added", "gain", "natural frequency (Hz)", "damping ratio"];
     paragraph(
         "What --select added to the model of the file, until no candidate was preferred, and what each addition changed.",
     ) + &table("Additions", &headings, &rows)
@@ -80,7 +73,8 @@ fn candidates(found: &Candidates) -> String {
                 true => format!(" ± {}", short(q.standard_error)),
                 false => String::new(),
             };
-            format!("{} {}{error} {}", q.name, short(q.value), q.unit)
+            let name = in_words(&q.name);
+            format!("{name} {}{error} {}", short(q.value), q.unit)
         });
         let estimates: Vec<String> = estimates.collect();
         let how = if candidate.is_refitted {

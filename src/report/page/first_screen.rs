@@ -9,6 +9,7 @@ use crate::report::answer::{AnswerRow, answer};
 use crate::report::chart::Figure;
 use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::extent::extent;
+use crate::report::summary::additions;
 use crate::report::text::{escape, prose};
 use kmcfit_core::assessment::VerdictLevel;
 use kmcfit_core::finding::Finding;
@@ -25,7 +26,7 @@ pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument) -> Stri
         Some(verdict) => verdict_line(verdict),
         None => state(document),
     };
-    let answer = answers(document) + &scope(run, document) + &advice(document);
+    let answer = answers(document) + &added(document) + &scope(run, document) + &advice(document);
     screen(&(source + &state), &answer, run.main_figure(document))
 }
 
@@ -58,6 +59,14 @@ pub(in crate::report) fn source_line(files: &[DataFile], size: Option<String>) -
     match escape(&parts.join(": ")) {
         text if text.is_empty() => text,
         text => format!("<p class=\"soft\">{text}</p>\n"),
+    }
+}
+
+/// What `--select` added to the model of the file.
+fn added(document: &ResultDocument) -> String {
+    match additions(document) {
+        steps if steps.is_empty() => String::new(),
+        steps => paragraph(&format!("Added to the model: {}.", steps.join("; "))),
     }
 }
 
