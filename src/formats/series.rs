@@ -125,17 +125,21 @@ pub(super) fn begins_so(bytes: &[u8]) -> bool {
         return true;
     }
     let lines: Vec<&str> = text.lines().collect();
-    let mut begin = 0;
+    let (mut begin, mut stated_width) = (0, None);
     // A header of numbers can stand before that of the series.
     let found = (1..lines.len()).find_map(|i| {
         let header = lines.get(begin..i)?;
-        let width = width_of(header);
+        stated_width = lines
+            .get(i - 1)
+            .and_then(|line| width(line))
+            .or(stated_width);
+        let width = stated_width;
         let is_row = |line: &str| numbers(line, width).is_some_and(|row| !row.is_empty());
         if !is_row(lines[i]) || is_row(lines[i - 1]) {
             return None;
         }
         let found = stated(header).and_then(|head| Some((i, head.count?, width)));
-        begin = i;
+        (begin, stated_width) = (i, None);
         found
     });
     let Some((first, count, width)) = found else {

@@ -131,6 +131,15 @@ impl Bands {
         };
         let stride = problem.functions.nodes().div_ceil(MOST_NODES);
         let all = problem.functions.nodes();
+        // Constants have one value, which both ends show.
+        let is_equal = |values: &Vec<f64>| values.iter().all(|value| *value == values[0]);
+        let is_constant = problem
+            .functions
+            .values(theta)
+            .iter()
+            .enumerate()
+            .all(|(f, values)| problem.functions.is_constant_or_known(f) && is_equal(values));
+        let stride = if is_constant { all } else { stride };
         let thinned = (0..all - 1).step_by(stride);
         let nodes: Vec<usize> = thinned.chain([all - 1]).collect();
         let variants = match information.is_equation() {
