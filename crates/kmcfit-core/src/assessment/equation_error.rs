@@ -77,7 +77,7 @@ impl EquationErrorIntervals {
             NoEquationRows::ManySamples => NoIntervals::ManySamples,
             NoEquationRows::ScaleOverTime => NoIntervals::ScaleOverTime,
         })?;
-        let bands = Bands::of_equation(problem, theta, evaluation, &rows);
+        let bands = Bands::of_equation_error(problem, theta, evaluation, &rows);
         let mut classifications = classify_functions(problem, evaluation, &bands);
         condition_on_negligible_noise(&mut classifications);
         Ok(Self {

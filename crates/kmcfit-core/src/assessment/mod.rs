@@ -203,7 +203,7 @@ impl FitAssessment {
     ) {
         let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
         let found = parts.part("confidence intervals", || {
-            Bands::beside(problem, theta, evaluation, halved)
+            Bands::with_half_step(problem, theta, evaluation, halved)
         });
         let Some(bands) = found else {
             return;

@@ -82,11 +82,11 @@ pub struct Bands {
 impl Bands {
     /// Computes the bands at the parameters `theta`, evaluated in `evaluation`.
     pub fn at(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Self {
-        Self::beside(problem, theta, evaluation, None)
+        Self::with_half_step(problem, theta, evaluation, None)
     }
 
     /// [`Bands::at`], with the results on half the step where they are known.
-    pub(crate) fn beside(
+    pub(crate) fn with_half_step(
         problem: &Problem,
         theta: &[f64],
         evaluation: &Evaluation,
@@ -103,13 +103,13 @@ impl Bands {
     }
 
     /// Computes the bands of the equation error at its minimum `theta`, from the scores of its samples.
-    pub fn of_equation(
+    pub fn of_equation_error(
         problem: &Problem,
         theta: &[f64],
         evaluation: &Evaluation,
         equation: &EquationRows,
     ) -> Self {
-        let information = Information::of_equation(problem, theta, evaluation, equation);
+        let information = Information::of_equation_error(problem, theta, evaluation, equation);
         Self::from_information(problem, theta, evaluation, &information)
     }
 

@@ -106,7 +106,7 @@ impl Information {
     }
 
     /// Information of the equation error at its minimum `theta`, with the covariance from the scores of the samples.
-    pub fn of_equation(
+    pub fn of_equation_error(
         problem: &Problem,
         theta: &[f64],
         evaluation: &Evaluation,

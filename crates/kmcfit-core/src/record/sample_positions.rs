@@ -99,7 +99,7 @@ mod tests {
 
     /// Positions at nodes are those of a list of points.
     #[test]
-    fn places_on_nodes_are_points() {
+    fn positions_on_nodes_are_points() {
         let grid = Grid::new(1.0, 2.0, 11).expect("a grid");
         for nodes in [5, 11] {
             for samples in [1, 4, nodes] {

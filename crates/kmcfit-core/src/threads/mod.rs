@@ -31,7 +31,7 @@ static PROCESSORS: LazyLock<usize> =
 static BUSY: AtomicUsize = AtomicUsize::new(0);
 
 /// True if a processor is free and this thread may use it.
-pub(crate) fn spare() -> bool {
+pub(crate) fn has_idle_processor() -> bool {
     available() > 1
 }
 
@@ -100,7 +100,7 @@ pub(crate) fn given<T>(threads: usize, work: impl FnOnce() -> T) -> T {
 /// # Panics
 /// If one of them panics.
 pub fn both<A, B: Send>(own: impl FnOnce() -> A, other: impl FnOnce() -> B + Send) -> (A, B) {
-    if !spare() {
+    if !has_idle_processor() {
         return (own(), other());
     }
     // Taken by the second thread, or by this one without a second thread.
@@ -245,8 +245,8 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_that_shares_has_none_to_spare() {
-        let spare = std::thread::spawn(|| sharing(spare));
-        assert!(!spare.join().expect("no panic"));
+    fn a_thread_that_shares_has_no_idle_processor() {
+        let has_idle = std::thread::spawn(|| sharing(has_idle_processor));
+        assert!(!has_idle.join().expect("no panic"));
     }
 }

@@ -15,7 +15,7 @@ pub(super) struct StageRows {
 
 /// Rows before they are put into time order.
 #[derive(Default)]
-pub(super) struct LooseRows {
+pub(super) struct UnorderedRows {
     stages: Vec<u32>,
     /// End of the entries of each row.
     ends: Vec<u32>,
@@ -24,7 +24,7 @@ pub(super) struct LooseRows {
     right: Vec<f64>,
 }
 
-impl LooseRows {
+impl UnorderedRows {
     /// Adds a row of a stage with the coefficients `xi` that `is_entry` chooses, times `factor`.
     pub fn push<const W: usize>(
         &mut self,

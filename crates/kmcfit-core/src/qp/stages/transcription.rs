@@ -1,6 +1,6 @@
 //! A subproblem as a control problem along time.
 
-use super::rows::{LooseRows, StageRows};
+use super::rows::{StageRows, UnorderedRows};
 use super::sizes::{Sizes, stage_of, stage_of_cone};
 use super::transitions::{NONE, Transitions};
 use crate::constraints::{Rows, TOLERANCE};
@@ -232,12 +232,12 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
 
     /// The residuals, the proximal terms, and what holds the differences that act on no node.
     fn add_residuals(&mut self, sub: &Subproblem) -> Option<()> {
-        let mut loose = LooseRows::default();
-        self.add_rows(&sub.residuals, &mut loose)?;
+        let mut unordered = UnorderedRows::default();
+        self.add_rows(&sub.residuals, &mut unordered)?;
         let mut diagonal = |stage, column: usize, a| {
             let mut xi = [0.0; W];
             xi[column] = a;
-            loose.push(stage, &xi, 1.0, 0.0, |j| j == column);
+            unordered.push(stage, &xi, 1.0, 0.0, |j| j == column);
         };
         for (j, d) in sub.proximal.iter().enumerate().filter(|(_, d)| **d != 0.0) {
             match self.positions[j] {
@@ -249,16 +249,16 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         for (f, order) in self.orders.iter().enumerate() {
             (self.stages.saturating_sub(*order)..self.stages).for_each(|i| diagonal(i, X + f, 1.0));
         }
-        self.residuals = loose.in_order(self.stages).0;
+        self.residuals = unordered.in_order(self.stages).0;
         Some(())
     }
 
     /// Adds the rows, each at its stage.
-    fn add_rows(&self, rows: &Rows, loose: &mut LooseRows) -> Option<()> {
+    fn add_rows(&self, rows: &Rows, unordered: &mut UnorderedRows) -> Option<()> {
         for i in 0..rows.len() {
             let stage = stage_of(rows, i, &self.positions);
             let (xi, constant) = self.row_at(stage, rows, i)?;
-            loose.push(stage, &xi, 1.0, rows.right()[i] - constant, |j| {
+            unordered.push(stage, &xi, 1.0, rows.right()[i] - constant, |j| {
                 xi[j] != 0.0
             });
         }
@@ -266,7 +266,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
     }
 
     fn add_constraints(&mut self, sub: &Subproblem) -> Option<()> {
-        let mut loose = LooseRows::default();
+        let mut unordered = UnorderedRows::default();
         let mut sides = Vec::with_capacity(sub.inequalities.len());
         for i in 0..sub.inequalities.len() {
             let stage = stage_of(&sub.inequalities, i, &self.positions);
@@ -285,12 +285,12 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             }
             for (sign, bound) in [(1.0, upper), (-1.0, -lower)] {
                 if bound.is_finite() {
-                    loose.push(stage, &xi, sign, bound, |j| xi[j] != 0.0);
+                    unordered.push(stage, &xi, sign, bound, |j| xi[j] != 0.0);
                     sides.push(Side { row: i, sign });
                 }
             }
         }
-        let (rows, order) = loose.in_order(self.stages);
+        let (rows, order) = unordered.in_order(self.stages);
         self.constraints = rows;
         self.sides = order.iter().map(|i| sides[*i as usize]).collect();
         let scale = |side: &Side| sub.inequalities.scale(side.row);
@@ -305,7 +305,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             .map(|cone| stage_of_cone(cone, &self.positions));
         let stages: Vec<usize> = stages.collect();
         self.cone_order = order_by(&stages);
-        let mut loose = LooseRows::default();
+        let mut unordered = UnorderedRows::default();
         self.cone_rows.push(0);
         for k in &self.cone_order {
             let (cone, stage) = (&sub.cones[*k].rows, stages[*k]);
@@ -313,18 +313,18 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             let rows = rows.collect::<Option<Vec<_>>>()?;
             let is_used = |j: usize| rows.iter().any(|(xi, _)| xi[j] != 0.0);
             for (i, (xi, constant)) in rows.iter().enumerate() {
-                loose.push(stage, xi, 1.0, cone.right()[i] - constant, is_used);
+                unordered.push(stage, xi, 1.0, cone.right()[i] - constant, is_used);
             }
-            self.cone_rows.push(loose.len() as u32);
+            self.cone_rows.push(unordered.len() as u32);
         }
-        self.cones = loose.in_order(self.stages).0;
+        self.cones = unordered.in_order(self.stages).0;
         Some(())
     }
 
     fn add_absolute_values(&mut self, sub: &Subproblem) -> Option<()> {
-        let mut loose = LooseRows::default();
-        self.add_rows(&sub.absolute, &mut loose)?;
-        let (rows, order) = loose.in_order(self.stages);
+        let mut unordered = UnorderedRows::default();
+        self.add_rows(&sub.absolute, &mut unordered)?;
+        let (rows, order) = unordered.in_order(self.stages);
         self.absolute = rows;
         self.absolute_order = order.iter().map(|i| *i as usize).collect();
         let half = |i: &usize| 0.5 * sub.absolute_weights[*i];

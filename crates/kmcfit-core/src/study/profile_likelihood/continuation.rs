@@ -181,11 +181,11 @@ impl<'a> ProfileSearch<'a> {
             return (far, what);
         }
         // A program satisfies rows on several parameters to its own accuracy only.
-        let spare = match self.problem.constraints.are_simple() {
+        let room = match self.problem.constraints.are_simple() {
             true => 0.0,
             false => SPARE * size.min((reached - here).abs()),
         };
-        (reached - side * spare, End::Bound)
+        (reached - side * room, End::Bound)
     }
 
     fn first_step(&self, start: &Iterate) -> f64 {
