@@ -127,6 +127,11 @@ impl Addition {
         }
     }
 
+    /// True for a function that varies more.
+    pub(super) fn varies(self) -> bool {
+        matches!(self, Self::Variation { .. } | Self::FinerBasis { .. })
+    }
+
     pub(super) fn family(self, problem: &Problem) -> Family {
         let of_kind = |kind: CoefficientKind| match kind {
             CoefficientKind::DAMPING

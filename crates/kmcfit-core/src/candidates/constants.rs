@@ -9,7 +9,7 @@
 
 use super::jump_basis::is_jump;
 use super::penalised_misfit::Linearised;
-use super::{Addition, Candidate, Candidates, GAIN};
+use super::{Candidate, Candidates, GAIN};
 use crate::alternatives::{Refit, with_functions};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::objective::Evaluation;
@@ -29,21 +29,13 @@ pub(super) fn of(
     let own = Linearised::at(problem, evaluation).own().misfit - held * price;
     let refit = Refit::of(constants, &start)?;
     let alone = Linearised::at(&refit.problem, refit.evaluation()).own();
-    let beside = Candidates::at(&refit.problem, &refit.fit.best.parameters, Some(own))?;
     // Where constants alone are as good, a function that varies is a finer basis than the samples need, and no wrong one.
     (own - alone.misfit < -GAIN).then_some(())?;
+    let beside = Candidates::at(&refit.problem, &refit.fit.best.parameters, Some(own))?;
     let others = beside
         .list
         .into_iter()
         .filter(|c| c.is_refitted && c.gain > -GAIN);
-    // A function that varies in another basis is no constant.
-    let is_constant = |addition: &Addition| {
-        !matches!(
-            addition,
-            Addition::Variation { .. } | Addition::FinerBasis { .. }
-        )
-    };
-    let others = others.filter(|c| c.additions.iter().all(is_constant));
     let all = others.map(|candidate| {
         let candidate = Candidate {
             to_constants: true,

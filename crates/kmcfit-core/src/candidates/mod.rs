@@ -142,12 +142,14 @@ impl Candidates {
         Some(own)
     }
 
-    /// The candidates of a problem with white noise at its least squares, beside a model with the penalised misfit `other` or its own.
+    /// The candidates of a problem with white noise at its least squares; beside a model with the penalised misfit `other` those without a function
+    /// that varies.
     fn at(problem: &Problem, theta: &[f64], other: Option<f64>) -> Option<Self> {
         let evaluation = problem.evaluate(theta).ok()?;
         let linearised = Linearised::at(problem, &evaluation);
         let mut own = linearised.own();
-        let linear = linear_candidates(problem, theta, &evaluation, &linearised);
+        let mut linear = linear_candidates(problem, theta, &evaluation, &linearised);
+        linear.retain(|c| other.is_none() || !c.addition.varies());
         let lowest = linear
             .iter()
             .map(|c| c.judged.misfit)
