@@ -206,14 +206,14 @@ def test_the_text_of_a_model_is_kept_for_the_next_record(record):
 
 def test_what_is_preferred_is_added(record, fit, tmp_path):
     time, force, acceleration = record
-    data = km.Experiment(time=time, force=force, acceleration=acceleration + 0.1)
+    data = km.Experiment(time=time, force=force, acceleration=acceleration + 0.05 * time)
     plain, chosen = km.Model(mass=2.4).fit(data), km.Model(mass=2.4).fit(data, select=True)
     assert "selection" not in plain.result and plain.verdict.level != "adequate"
     (step,) = chosen.result["selection"]
-    assert "offset" in step["added"] and step["gain"] > 6.0
+    assert "drift" in step["added"] and step["gain"] > 6.0
     assert chosen.verdict.level == "adequate"
-    low, high = next(row for row in chosen.estimates if "offset" in row.quantity).ci95
-    # Five standard errors about the offset that was put in.
-    assert abs(0.5 * (low + high) - 0.1) < 1.25 * (high - low)
+    # Made with 1500 N/m, as above.
+    low, high = chosen.estimates["stiffness"].ci95
+    assert abs(chosen.estimates["stiffness"].value - 1500.0) < 1.5 * (high - low)
     chosen.save(tmp_path / "run")
     assert km.open(tmp_path / "run").result["selection"] == chosen.result["selection"]
