@@ -102,6 +102,7 @@ fn with(
     let step = SelectionStep {
         added: best.words.clone(),
         gain: best.gain,
+        estimates: best.estimates.clone(),
         set,
         natural_frequency: both("natural_frequency"),
         damping_ratio: both("damping_ratio"),

@@ -6,6 +6,16 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde_json::Value;
 use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+/// The folder of the rigs that `.ci/long rigs` makes.
+fn rigs() -> Option<PathBuf> {
+    let found = std::env::var_os("KMCFIT_RIGS").map(PathBuf::from);
+    if found.is_none() {
+        eprintln!("SKIPPED: the rigs are made by `.ci/long rigs`");
+    }
+    found
+}
 
 /// White noise of unit variance.
 fn noise(seed: u64, count: usize) -> Vec<f64> {
@@ -534,4 +544,59 @@ fn contaminated_ring_downs_are_adequate_where_their_intervals_hold() {
         far_outside.iter().all(|n| *n <= far * adequate),
         "{far_outside:?}"
     );
+}
+
+/// The stiffness of 9869.6 N/m falls by 15 % at 20 s, and the force sensor has noise of 0.1 N: constants, then what is preferred.
+#[test]
+fn a_jump_of_the_stiffness_is_found_with_its_time() {
+    let Some(rigs) = rigs() else {
+        return;
+    };
+    let bench = Workbench::empty();
+    let record = rigs.join("d/damage.csv");
+    let document = fit(&bench, &[&record.to_string_lossy(), "--select"]);
+    let steps = document["selection"].as_array().expect("steps");
+    assert!(steps.len() <= 2, "{steps:?}");
+    for (quantity, truth) in [("time", 20.0), ("before", 9869.604), ("after", 8389.164)] {
+        let estimates = steps[0]["estimates"].as_array().expect("estimates");
+        let found = estimates.iter().find(|found| found["name"] == quantity);
+        let [value, error] = ["value", "standard_error"].map(|key| {
+            let number = found.and_then(|found| found[key].as_f64());
+            number.expect("a number")
+        });
+        // 1.96 standard errors; the noise of the force, which the first step does not have, adds to them.
+        assert!(
+            (value - truth).abs() < 1.96 * error,
+            "{quantity}: {value} {error}"
+        );
+    }
+    assert!(holds(&document, "mass", 10.0) && holds(&document, "damping", 12.566_371));
+    assert_eq!(level(&document), "adequate");
+}
+
+/// A pendulum with dry friction from 20 degrees: 7 s, and all 20 s.
+#[test]
+fn a_pendulum_has_a_cubic_spring_and_friction() {
+    let Some(rigs) = rigs() else {
+        return;
+    };
+    let text = std::fs::read_to_string(rigs.join("g/pendulum.csv")).expect("a record");
+    for rows in [701, usize::MAX] {
+        let bench = Workbench::empty();
+        let part: Vec<&str> = text.lines().take(rows).collect();
+        bench.write("pendulum.csv", &part.join("\n"));
+        let document = fit(&bench, &["pendulum.csv", "--select"]);
+        for (name, truth) in [
+            ("natural_frequency", 0.704_85),
+            ("c_over_m", 0.017_71),
+            ("cubic_stiffness_over_m", -3.2689),
+            ("coulomb_friction_over_m", 0.102_69),
+        ] {
+            let (value, half) = estimate(&document, name);
+            assert!(
+                (value - truth).abs() < half,
+                "{rows}, {name}: {value} {half}"
+            );
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Steps of `fit --select`.
 
+use kmcfit_core::identifiability::Quantity;
 use serde::{Deserialize, Serialize};
 
 /// One addition to the model.
@@ -9,6 +10,9 @@ pub struct SelectionStep {
     pub added: String,
     /// Its gain.
     pub gain: f64,
+    /// What the addition estimated when it was made.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimates: Vec<Quantity>,
     /// Overrides of the model file that add it.
     pub set: Vec<String>,
     /// Natural frequency before and after, Hz; absent where there is none.

@@ -59,13 +59,14 @@ pub(super) fn estimates(
             let slopes = [h * (1.0 - share) / step, -h / step, h * share / step];
             let slopes = slopes.into_iter().enumerate();
             let unit = own.quantity.unit();
+            let slopes = slopes.map(|(j, a)| (first + j, a)).collect();
+            let time = Quantity {
+                // An acceleration sampled at the jump has one side of it, the node at the jump both.
+                basis_error: 0.5 * h,
+                ..of("time", "s", time, slopes)
+            };
             vec![
-                of(
-                    "time",
-                    "s",
-                    time,
-                    slopes.map(|(j, a)| (first + j, a)).collect(),
-                ),
+                time,
                 one("before", unit, first),
                 one("after", unit, first + 2),
             ]
