@@ -4,6 +4,7 @@
 pub mod closed_form;
 pub mod counts;
 pub mod forced;
+pub mod lacking;
 pub mod properties;
 pub mod reference;
 pub mod sensed;

@@ -1,0 +1,162 @@
+//! Candidates on records with known truth: how often the right one is preferred, how often one is preferred without a cause, and how often
+//! intervals hold the truth once what is preferred has been added. Data by an independent integrator (`lacking.rs`). Seeds are 0, 1, 2, ...
+//!
+//! `.ci/long candidates` counts all; `KMCFIT_CASES` is the number of records of each kind, `KMCFIT_SHOW` prints each.
+
+use crate::common::lacking::{Case, Fitted, Kind};
+use kmcfit_core::candidates::Candidate;
+
+/// Periods, noise relative to the amplitude, and multiple of the size, of 20 records with white noise, and again with AR(1).
+const SETTINGS: [(f64, f64, f64); 20] = [
+    (5.0, 0.01, 1.0),
+    (10.0, 0.01, 1.0),
+    (50.0, 0.01, 1.0),
+    (5.0, 0.001, 1.0),
+    (10.0, 0.05, 1.0),
+    (200.0, 0.01, 1.0),
+    (50.0, 0.01, 0.3),
+    (10.0, 0.01, 1.0),
+    (5.0, 0.05, 1.0),
+    (50.0, 0.001, 1.0),
+    (5.0, 0.01, 1.0),
+    (10.0, 0.01, 0.3),
+    (50.0, 0.01, 1.0),
+    (200.0, 0.001, 1.0),
+    (10.0, 0.001, 1.0),
+    (50.0, 0.05, 1.0),
+    (5.0, 0.01, 0.3),
+    (10.0, 0.01, 1.0),
+    (50.0, 0.01, 1.0),
+    (200.0, 0.05, 1.0),
+];
+/// Coefficient of the noise with AR(1).
+const PHI: f64 = 0.9;
+
+const FREE: [Kind; 13] = [
+    Kind::SlowStiffness,
+    Kind::Trend,
+    Kind::SlowDamping,
+    Kind::Jump,
+    Kind::Cubic,
+    Kind::Quadratic,
+    Kind::Coulomb,
+    Kind::Offset,
+    Kind::Drift,
+    Kind::Mode(2.7),
+    Kind::Mode(1.12),
+    Kind::Mains,
+    Kind::SensorCurve,
+];
+const FORCED: [Kind; 18] = [
+    Kind::SlowStiffness,
+    Kind::Trend,
+    Kind::SlowMass,
+    Kind::SlowDamping,
+    Kind::Jump,
+    Kind::Cubic,
+    Kind::Quadratic,
+    Kind::Coulomb,
+    Kind::Offset,
+    Kind::Drift,
+    Kind::Delay,
+    Kind::Mode(2.7),
+    Kind::Mode(1.12),
+    Kind::Mains,
+    Kind::SensorCurve,
+    Kind::SmoothForce,
+    Kind::Disturbance,
+    Kind::ForceNoise,
+];
+
+fn case(kind: Kind, is_free: bool, seed: u64) -> Case {
+    let count = SETTINGS.len() as u64;
+    let (periods, noise, times) = SETTINGS[(seed % count) as usize];
+    Case {
+        kind,
+        is_free,
+        seed,
+        periods,
+        noise,
+        phi: if seed / count % 2 == 1 { PHI } else { 0.0 },
+        times,
+    }
+}
+
+/// Number of records of each kind.
+fn cases(usual: u64) -> u64 {
+    let given = std::env::var("KMCFIT_CASES").ok();
+    given.map_or(usual, |text| text.parse().expect("a number of cases"))
+}
+
+fn shows() -> bool {
+    std::env::var_os("KMCFIT_SHOW").is_some()
+}
+
+/// Counts of a kind: records, those with a preferred candidate, with the right one first, and with it among those that are as good.
+#[derive(Debug, Default, Clone, Copy)]
+struct Counts {
+    all: usize,
+    detected: usize,
+    first: usize,
+    tied: usize,
+}
+
+fn counted(kind: Kind, is_free: bool, count: u64) -> Counts {
+    let mut counts = Counts::default();
+    for seed in 0..count {
+        let case = case(kind, is_free, seed);
+        let Some(fitted) = Fitted::of(&case.made().problem()) else {
+            println!("{case:?}: no fit");
+            continue;
+        };
+        counts.all += 1;
+        let ties = fitted.assessment.candidates.as_ref().map(|c| c.ties());
+        let ties = ties.unwrap_or_default();
+        let is_right = |c: &Candidate| matches!(c.additions.as_slice(), [only] if kind.is(only));
+        counts.detected += usize::from(!ties.is_empty());
+        counts.first += usize::from(ties.first().is_some_and(is_right));
+        counts.tied += usize::from(ties.iter().any(is_right));
+        if shows() {
+            let names = ties.iter().map(|c| format!("{} {:.0}", c.name, c.gain));
+            println!("{case:?}: {}", names.collect::<Vec<_>>().join(", "));
+        }
+    }
+    let motion = if is_free { "free" } else { "forced" };
+    let Counts {
+        all,
+        detected,
+        first,
+        tied,
+    } = counts;
+    println!("| {kind:?} | {motion} | {all} | {detected} | {first} | {tied} |");
+    counts
+}
+
+#[test]
+#[ignore = "40 records of each of 31 kinds take long"]
+fn the_right_candidate_is_preferred() {
+    println!("| kind | motion | records | detected | right first | right first or as good |");
+    println!("|---|---|---|---|---|---|");
+    let free = FREE.map(|kind| (kind, true));
+    let all = free.into_iter().chain(FORCED.map(|kind| (kind, false)));
+    let counts: Vec<Counts> = all
+        .map(|(kind, is_free)| counted(kind, is_free, cases(40)))
+        .collect();
+    let sum = |of: fn(&Counts) -> usize| counts.iter().map(of).sum::<usize>();
+    let (detected, tied) = (sum(|c| c.detected), sum(|c| c.tied));
+    println!(
+        "| all | | {} | {detected} | {} | {tied} |",
+        sum(|c| c.all),
+        sum(|c| c.first)
+    );
+    assert!(10 * tied >= 9 * detected, "{tied} of {detected}");
+}
+
+#[test]
+#[ignore = "200 records take long"]
+fn few_records_without_a_cause_have_a_preferred_candidate() {
+    for is_free in [true, false] {
+        let counts = counted(Kind::Clean, is_free, cases(100));
+        assert!(20 * counts.detected <= counts.all, "{counts:?}");
+    }
+}
