@@ -1,6 +1,5 @@
 //! Refits of the most promising candidates.
 
-use super::COLOURED;
 use super::addition::{Addition, Family};
 use super::columns::LinearCandidate;
 use super::early;
@@ -8,6 +7,7 @@ use super::found::{Found, plain};
 use super::jump;
 use super::penalised_misfit::{Judged, Linearised};
 use super::predictions;
+use super::{COLOURED, GAIN};
 use crate::alternatives::{Clock, RecordParameter, Refit, on_best_clock, with_samples_of};
 use crate::problem::Problem;
 use crate::simd::sum::rms;
@@ -39,7 +39,17 @@ pub(super) fn refits(
     let mut found: Vec<Found> = found.into_iter().flatten().collect();
     let is_free = problem.experiments.iter().all(|e| e.is_free());
     if is_free && own.order >= COLOURED {
-        let pairs = pairs(problem, theta, &found, linear);
+        let mut pairs = pairs(problem, theta, &found, linear);
+        // What the second of a pair adds is judged as what the first does.
+        pairs.retain(|pair| {
+            let has = |single: &&Found| {
+                pair.additions
+                    .iter()
+                    .any(|a| a.is_like(single.additions[0]))
+            };
+            let mut singles = found.iter().filter(has);
+            singles.all(|single| single.judged.misfit - pair.judged.misfit >= GAIN)
+        });
         found.extend(pairs);
     }
     found

@@ -1,9 +1,11 @@
-//! Records of an oscillator of 1 Hz that has one thing more than constants: a free decay (mass 1 kg, damping ratio 1 %, amplitude 1 m), or the
+//! Records of an oscillator of 1 Hz (15 Hz beside the mains) that has one thing more than constants: a free decay (mass 1 kg, damping ratio 1 %, amplitude 1 m), or the
 //! response from rest to a broadband force that is linear between its samples (mass 1.7 kg, damping ratio 2 %); displacements, 20.5 samples in
 //! a period, by an independent integrator.
 
 use super::forced::{broadband, response, rms, white};
-use kmcfit_core::assessment::{Estimate, FitAssessment, estimates};
+use kmcfit_core::assessment::{
+    Doubt, Estimate, FitAssessment, VerdictLevel, estimates, verdict_reasons,
+};
 use kmcfit_core::builder::{Builder, ChannelSpec, Record};
 use kmcfit_core::candidates::{Addition, RecordParameter};
 use kmcfit_core::model::{CoefficientSpec, ScalarSpec};
@@ -16,8 +18,9 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 const SAMPLES_PER_PERIOD: f64 = 20.5;
 /// Velocity over which the sign of friction changes, relative to the largest velocity: below that of the noise.
 const FRICTION_WIDTH: f64 = 0.005;
-/// Frequency of the mains.
-const MAINS: f64 = 3.37;
+/// Frequency of the mains, Hz, and relative to that of the oscillator.
+const MAINS: f64 = 50.0;
+const MAINS_RATIO: f64 = 3.37;
 /// Damping ratio of a second mode.
 const SECOND_RATIO: f64 = 0.015;
 /// Sines of a smooth force, and their largest frequency.
@@ -138,15 +141,28 @@ impl Case {
         (self.periods * SAMPLES_PER_PERIOD) as usize + 1
     }
 
+    /// Natural frequency, Hz.
+    fn frequency(&self) -> f64 {
+        match self.kind {
+            Kind::Mains => MAINS / MAINS_RATIO,
+            _ => 1.0,
+        }
+    }
+
+    /// Time between samples, s.
+    fn spacing(&self) -> f64 {
+        1.0 / (SAMPLES_PER_PERIOD * self.frequency())
+    }
+
     fn white(&self, stream: u64) -> Vec<f64> {
         white(self.seed, stream, self.count())
     }
 
     pub fn made(&self) -> Made {
         let count = self.count();
-        let h = 1.0 / SAMPLES_PER_PERIOD;
+        let h = self.spacing();
         let span = h * (count - 1) as f64;
-        let (omega, size) = (TAU, self.times * self.kind.size());
+        let (omega, size) = (TAU * self.frequency(), self.times * self.kind.size());
         let (m, ratio) = if self.is_free {
             (1.0, 0.01)
         } else {
@@ -224,10 +240,10 @@ impl Case {
 
     /// The displacements without noise.
     fn exact(&self, force: &[f64], course: Course, amplitude: f64, size: f64) -> Vec<f64> {
-        let h = 1.0 / SAMPLES_PER_PERIOD;
+        let h = self.spacing();
         let span = h * (force.len() - 1) as f64;
         let [m, c, k] = course(0.0);
-        let omega = TAU;
+        let omega = TAU * self.frequency();
         let fastest = omega * amplitude;
         let start = [if self.is_free { 1.0 } else { 0.0 }, 0.0];
         let displacements = |force: &[f64], a: &dyn Fn(f64, f64, f64, f64) -> f64| -> Vec<f64> {
@@ -273,16 +289,12 @@ impl Case {
                 with(&|_, y| size * (y * y / amplitude + y.powi(3) / (amplitude * amplitude)))
             }
             Kind::Delay => {
-                // The response began to be sampled earlier by the delay: the force is later in it.
-                let (late, delay) = (size, size * h);
-                let mut moved = vec![0.0];
-                moved.extend(force.windows(2).map(|f| f[1] + late * (f[0] - f[1])));
-                let last = |t: f64| {
-                    let x = ((t - delay) / h).clamp(0.0, (force.len() - 1) as f64);
+                let late = |t: f64| {
+                    let x = (t / h - size).clamp(0.0, (force.len() - 1) as f64);
                     let i = (x as usize).min(force.len() - 2);
                     force[i] + (x - i as f64) * (force[i + 1] - force[i])
                 };
-                displacements(&moved, &|t, y, v, _| (last(t) - c * v - k * y) / m)
+                displacements(force, &|t, y, v, _| (late(t) - c * v - k * y) / m)
             }
             Kind::Mode(multiple) => {
                 let plain = displacements(force, &by_course);
@@ -357,6 +369,12 @@ impl Fitted {
             fit,
             assessment,
         })
+    }
+
+    pub fn level(&self) -> VerdictLevel {
+        let reasons = verdict_reasons(&self.problem, &self.fit, Some(&self.assessment));
+        let most = reasons.iter().map(Doubt::severity).max();
+        VerdictLevel::of(most.unwrap_or_default())
     }
 
     pub fn estimate(&self, name: &str) -> Option<Estimate> {

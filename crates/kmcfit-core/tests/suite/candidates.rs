@@ -3,8 +3,11 @@
 //!
 //! `.ci/long candidates` counts all; `KMCFIT_CASES` is the number of records of each kind, `KMCFIT_SHOW` prints each.
 
-use crate::common::lacking::{Case, Fitted, Kind};
+use crate::common::lacking::{Case, Fitted, Kind, NAMES};
+use kmcfit_core::assessment::VerdictLevel;
 use kmcfit_core::candidates::Candidate;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Periods, noise relative to the amplitude, and multiple of the size, of 20 records with white noise, and again with AR(1).
 const SETTINGS: [(f64, f64, f64); 20] = [
@@ -31,6 +34,13 @@ const SETTINGS: [(f64, f64, f64); 20] = [
 ];
 /// Coefficient of the noise with AR(1).
 const PHI: f64 = 0.9;
+
+/// The same of large noise, from the first record to the last.
+const PHIS: [f64; 2] = [0.7, 0.97];
+/// Root mean square of a sine relative to its amplitude.
+const RESPONSE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// 3.5 standard errors in half-widths of an interval.
+const FAR: f64 = 3.5 / 1.96;
 
 const FREE: [Kind; 13] = [
     Kind::SlowStiffness,
@@ -158,5 +168,98 @@ fn few_records_without_a_cause_have_a_preferred_candidate() {
     for is_free in [true, false] {
         let counts = counted(Kind::Clean, is_free, cases(100));
         assert!(20 * counts.detected <= counts.all, "{counts:?}");
+    }
+}
+
+/// Free and forced records of 50 periods with AR(1) noise of 15 % of the response.
+#[test]
+#[ignore = "60 records"]
+fn large_coloured_noise_is_noise() {
+    let count = cases(60);
+    let (mut inadequate, mut inside, mut stated) = (0, [0; 2], 0);
+    for seed in 0..count {
+        let case = Case {
+            kind: Kind::Clean,
+            is_free: seed % 2 == 0,
+            seed,
+            periods: 50.0,
+            noise: 0.15 * RESPONSE,
+            phi: PHIS[0] + (PHIS[1] - PHIS[0]) * seed as f64 / (count - 1) as f64,
+            times: 1.0,
+        };
+        let made = case.made();
+        let fitted = Fitted::of(&made.problem()).expect("a fit");
+        let level = fitted.level();
+        inadequate += usize::from(level == VerdictLevel::Inadequate);
+        let errors = [0, 1].map(|i| fitted.error(NAMES[i], made.truth[i]));
+        stated += usize::from(errors[0].is_some());
+        for (inside, error) in inside.iter_mut().zip(errors) {
+            *inside += usize::from(error.is_some_and(|error| error.abs() <= 1.0));
+        }
+        if shows() {
+            println!("{case:?}: {level:?} {errors:?}");
+        }
+    }
+    println!(
+        "| noise of 15 % | {count} | inadequate {inadequate} | with intervals {stated} | inside {inside:?} |"
+    );
+    assert!(20 * inadequate <= count as usize, "{inadequate}");
+    for inside in inside {
+        assert!(10 * inside >= 9 * count as usize, "{inside}");
+    }
+}
+
+/// Ring-downs with a second mode, fitted with constants: an adequate fit has the right frequency and damping ratio.
+#[test]
+#[ignore = "200 records"]
+fn a_second_mode_does_not_spoil_an_adequate_fit() {
+    let (mut adequate, mut outside, mut far) = (0, [0; 2], [0; 2]);
+    for seed in 0..cases(200) {
+        let mut random = ChaCha8Rng::seed_from_u64(7000 + seed);
+        let mut between = |low: f64, high: f64| random.random_range(low..high);
+        let multiple = if seed % 2 == 0 {
+            1.12
+        } else {
+            between(1.5, 4.0)
+        };
+        let kind = Kind::Mode(multiple);
+        let case = Case {
+            kind,
+            is_free: true,
+            seed,
+            periods: 5.0 * 10f64.powf(between(0.0, 1.0)),
+            noise: 0.001 * 10f64.powf(between(0.0, 1.0)),
+            phi: 0.0,
+            // 0.1 to 3 %
+            times: 30f64.powf(between(-1.0, 0.0)),
+        };
+        let made = case.made();
+        let Some(fitted) = Fitted::of(&made.problem()) else {
+            println!("{case:?}: no fit");
+            continue;
+        };
+        let level = fitted.level();
+        let errors = [0, 1].map(|i| fitted.error(NAMES[i], made.truth[i]));
+        if level == VerdictLevel::Adequate {
+            adequate += 1;
+            for i in 0..2 {
+                let error = errors[i].map_or(f64::INFINITY, f64::abs);
+                outside[i] += usize::from(error > 1.0);
+                far[i] += usize::from(error > FAR);
+            }
+        }
+        if shows() {
+            println!("{case:?}: {level:?} {errors:?}");
+        }
+    }
+    println!(
+        "| second mode | adequate {adequate} | outside {outside:?} | farther than 3.5 standard errors {far:?} |"
+    );
+    for i in 0..2 {
+        assert!(
+            100 * outside[i] <= 8 * adequate,
+            "{outside:?} of {adequate}"
+        );
+        assert!(100 * far[i] <= adequate, "{far:?} of {adequate}");
     }
 }
