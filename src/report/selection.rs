@@ -74,7 +74,7 @@ fn with(
     let overrides = Override::parse_all(&set).ok()?;
     let file = now.file.clone().with_overrides(&overrides).ok()?;
     let mut model = build(&file, BuildMode::Fit).ok()?;
-    let start = model.problem.functions.start_of(&best.parameters_by_name);
+    let start = best.start(&model.problem.functions);
     model.problem = (model.problem)
         .with(|parts| parts.functions.set_start(&start))
         .ok()?;

@@ -176,7 +176,7 @@ fn ladder(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
     }
     let lowest = &DEGREES[1..];
     let degree = lowest[0];
-    let addition = Addition::Variation { function, degree };
+    let addition = variation(function, degree, most);
     let from_beginning = || {
         let quarter = early::of_first_quarter(problem, theta)?;
         let (changed, start) = addition.added(problem, &quarter, &[0.0])?;
@@ -188,6 +188,16 @@ fn ladder(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
     };
     let both = best.into_iter().chain(from_beginning());
     both.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))
+}
+
+/// A function that varies, of at most this degree; a degree of 2 needs no more.
+fn variation(function: usize, degree: usize, most: f64) -> Addition {
+    let is_slow = degree == 1 || (2 * degree) as f64 <= most;
+    Addition::Variation {
+        function,
+        degree,
+        next: if is_slow { 2 * degree } else { degree },
+    }
 }
 
 /// Refits with finer and finer bases, as long as these are better.
@@ -225,7 +235,7 @@ fn climb(
         if degree > 1 && degree as f64 > most {
             break;
         }
-        let addition = Addition::Variation { function, degree };
+        let addition = variation(function, degree, most);
         let Some(found) = plain(problem, &theta, addition, &further) else {
             break;
         };

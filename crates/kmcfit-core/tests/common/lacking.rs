@@ -7,11 +7,11 @@ use kmcfit_core::assessment::{
     Doubt, Estimate, FitAssessment, VerdictLevel, estimates, verdict_reasons,
 };
 use kmcfit_core::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::candidates::{Addition, RecordParameter};
+use kmcfit_core::candidates::{Addition, Candidate, RecordParameter};
 use kmcfit_core::model::{CoefficientSpec, ScalarSpec};
 use kmcfit_core::problem::Problem;
 use kmcfit_core::record::{ChannelKind, Weighting};
-use kmcfit_core::solvers::{Fit, FitSettings, Status, fit_with_noise};
+use kmcfit_core::solvers::{Fit, FitSettings, Initial, Status, fit_with_noise};
 use kmcfit_core::structure::CoefficientKind;
 use std::f64::consts::{PI, SQRT_2, TAU};
 
@@ -21,6 +21,8 @@ const FRICTION_WIDTH: f64 = 0.005;
 /// Frequency of the mains, Hz, and relative to that of the oscillator.
 const MAINS: f64 = 50.0;
 const MAINS_RATIO: f64 = 3.37;
+/// Most additions by `--select`.
+const MOST_ADDITIONS: usize = 5;
 /// Damping ratio of a second mode.
 const SECOND_RATIO: f64 = 0.015;
 /// Sines of a smooth force, and their largest frequency.
@@ -359,15 +361,50 @@ pub struct Fitted {
 
 impl Fitted {
     pub fn of(problem: &Problem) -> Option<Self> {
-        let settings = FitSettings::default();
+        Self::with(problem, &FitSettings::default())
+    }
+
+    fn with(problem: &Problem, settings: &FitSettings) -> Option<Self> {
         let start = problem.start();
-        let (problem, fit) = fit_with_noise(problem, &start, &settings, &mut |_| {}).ok()?;
+        let (problem, fit) = fit_with_noise(problem, &start, settings, &mut |_| {}).ok()?;
         (fit.outcome.status == Status::Converged).then_some(())?;
         let assessment = FitAssessment::of(&problem, &fit, true);
         Some(Self {
             problem,
             fit,
             assessment,
+        })
+    }
+
+    /// The fit with what is preferred added, as `--select` adds it, and the number of additions.
+    pub fn selected(problem: &Problem) -> Option<(Self, usize)> {
+        let (mut now, mut problem) = (Self::of(problem)?, problem.clone());
+        let settings = FitSettings {
+            initial: Initial::Near,
+            ..FitSettings::default()
+        };
+        let mut count = 0;
+        while let Some(best) = now.preferred() {
+            if count + best.additions.len() > MOST_ADDITIONS {
+                break;
+            }
+            let Some(changed) = best.added_to(&problem) else {
+                break;
+            };
+            let Some(next) = Self::with(&changed, &settings) else {
+                break;
+            };
+            count += best.additions.len();
+            (now, problem) = (next, changed);
+        }
+        Some((now, count))
+    }
+
+    fn preferred(&self) -> Option<Candidate> {
+        let mut warnings = self.assessment.plausibility.warnings.iter();
+        warnings.find_map(|doubt| match doubt {
+            Doubt::Preferred { candidates } => candidates.first().cloned(),
+            _ => None,
         })
     }
 
