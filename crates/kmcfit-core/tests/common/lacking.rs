@@ -1,17 +1,13 @@
-//! Records of an oscillator of 1 Hz (15 Hz beside the mains) that has one thing more than constants: a free decay (mass 1 kg, damping ratio 1 %, amplitude 1 m), or the
-//! response from rest to a broadband force that is linear between its samples (mass 1.7 kg, damping ratio 2 %); displacements, 20.5 samples in
-//! a period, by an independent integrator.
+//! Records of an oscillator of 1 Hz (15 Hz beside the mains) that has one thing more than constants: a free decay (mass 1 kg, damping ratio 1 %,
+//! amplitude 1 m), or the response from rest to a broadband force that is linear between its samples (mass 1.7 kg, damping ratio 2 %);
+//! displacements, 20.5 samples in a period, by an independent integrator.
 
 use super::forced::{broadband, response, rms, white};
-use kmcfit_core::assessment::{
-    Doubt, Estimate, FitAssessment, VerdictLevel, estimates, verdict_reasons,
-};
 use kmcfit_core::builder::{Builder, ChannelSpec, Record};
-use kmcfit_core::candidates::{Addition, Candidate, RecordParameter};
+use kmcfit_core::candidates::{Addition, RecordParameter};
 use kmcfit_core::model::{CoefficientSpec, ScalarSpec};
 use kmcfit_core::problem::Problem;
 use kmcfit_core::record::{ChannelKind, Weighting};
-use kmcfit_core::solvers::{Fit, FitSettings, Initial, Status, fit_with_noise};
 use kmcfit_core::structure::CoefficientKind;
 use std::f64::consts::{PI, SQRT_2, TAU};
 
@@ -21,8 +17,8 @@ const FRICTION_WIDTH: f64 = 0.005;
 /// Frequency of the mains, Hz, and relative to that of the oscillator.
 const MAINS: f64 = 50.0;
 const MAINS_RATIO: f64 = 3.37;
-/// Most additions by `--select`.
-const MOST_ADDITIONS: usize = 5;
+/// Latest jump in a free decay, in periods.
+const LATEST_JUMP: f64 = 20.0;
 /// Damping ratio of a second mode.
 const SECOND_RATIO: f64 = 0.015;
 /// Sines of a smooth force, and their largest frequency.
@@ -172,12 +168,19 @@ impl Case {
         };
         let (c, k) = (2.0 * ratio * omega * m, m * omega * omega);
         let slow = |x: f64| 1.0 + size * (1.5 * PI * x).sin();
+        // A free decay is still in motion.
+        let last = if self.is_free {
+            LATEST_JUMP / self.periods
+        } else {
+            1.0
+        };
+        let jump = last.min(0.4);
         let course = |x: f64| match self.kind {
             Kind::SlowMass => [m * slow(x), c, k],
             Kind::SlowDamping => [m, c * slow(x), k],
             Kind::SlowStiffness => [m, c, k * slow(x)],
             Kind::Trend => [m, c, k * (1.0 - size * (x - 0.5))],
-            Kind::Jump => [m, c, if x < 0.4 { k } else { k * (1.0 - size) }],
+            Kind::Jump => [m, c, if x < jump { k } else { k * (1.0 - size) }],
             _ => [m, c, k],
         };
         let force = if self.is_free {
@@ -349,82 +352,6 @@ impl Case {
             });
             each.sum()
         }
-    }
-}
-
-/// A fit with its assessment.
-pub struct Fitted {
-    pub problem: Problem,
-    pub fit: Fit,
-    pub assessment: FitAssessment,
-}
-
-impl Fitted {
-    pub fn of(problem: &Problem) -> Option<Self> {
-        Self::with(problem, &FitSettings::default())
-    }
-
-    fn with(problem: &Problem, settings: &FitSettings) -> Option<Self> {
-        let start = problem.start();
-        let (problem, fit) = fit_with_noise(problem, &start, settings, &mut |_| {}).ok()?;
-        (fit.outcome.status == Status::Converged).then_some(())?;
-        let assessment = FitAssessment::of(&problem, &fit, true);
-        Some(Self {
-            problem,
-            fit,
-            assessment,
-        })
-    }
-
-    /// The fit with what is preferred added, as `--select` adds it, and the number of additions.
-    pub fn selected(problem: &Problem) -> Option<(Self, usize)> {
-        let (mut now, mut problem) = (Self::of(problem)?, problem.clone());
-        let settings = FitSettings {
-            initial: Initial::Near,
-            ..FitSettings::default()
-        };
-        let mut count = 0;
-        while let Some(best) = now.preferred() {
-            if count + best.additions.len() > MOST_ADDITIONS {
-                break;
-            }
-            let Some(changed) = best.added_to(&problem) else {
-                break;
-            };
-            let Some(next) = Self::with(&changed, &settings) else {
-                break;
-            };
-            count += best.additions.len();
-            (now, problem) = (next, changed);
-        }
-        Some((now, count))
-    }
-
-    fn preferred(&self) -> Option<Candidate> {
-        let mut warnings = self.assessment.plausibility.warnings.iter();
-        warnings.find_map(|doubt| match doubt {
-            Doubt::Preferred { candidates } => candidates.first().cloned(),
-            _ => None,
-        })
-    }
-
-    pub fn level(&self) -> VerdictLevel {
-        let reasons = verdict_reasons(&self.problem, &self.fit, Some(&self.assessment));
-        let most = reasons.iter().map(Doubt::severity).max();
-        VerdictLevel::of(most.unwrap_or_default())
-    }
-
-    pub fn estimate(&self, name: &str) -> Option<Estimate> {
-        let all = estimates(&self.problem, &self.fit, self.assessment.quantities());
-        let mut all = all.into_iter().filter(|(known, _)| known == name);
-        all.next().map(|(_, estimate)| estimate)
-    }
-
-    /// Error of an estimate over half the width of its interval; `None` without one.
-    pub fn error(&self, name: &str, truth: f64) -> Option<f64> {
-        let estimate = self.estimate(name)?;
-        let [low, high] = estimate.ci95?;
-        Some((estimate.value - truth) / (0.5 * (high - low)))
     }
 }
 

@@ -7,6 +7,7 @@ pub mod forced;
 pub mod lacking;
 pub mod properties;
 pub mod reference;
+pub mod selected;
 pub mod sensed;
 pub mod synthetic;
 

@@ -3,7 +3,8 @@
 //!
 //! `.ci/long candidates` counts all; `KMCFIT_CASES` is the number of records of each kind, `KMCFIT_SHOW` prints each.
 
-use crate::common::lacking::{Case, Fitted, Kind, NAMES};
+use crate::common::lacking::{Case, Kind, NAMES};
+use crate::common::selected::Fitted;
 use kmcfit_core::assessment::VerdictLevel;
 use kmcfit_core::candidates::Candidate;
 use rand::{RngExt, SeedableRng};
@@ -41,8 +42,6 @@ const PHIS: [f64; 2] = [0.7, 0.97];
 /// `sqrt((1 - exp(-2 pi)) / (4 pi))`.
 const SINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 const DECAY: f64 = 0.2818;
-/// Noise of ring-downs with a second mode.
-const SMALL_NOISE: f64 = 0.0012;
 /// 3.5 standard errors in half-widths of an interval.
 const FAR: f64 = 3.5 / 1.96;
 
@@ -217,7 +216,9 @@ fn large_coloured_noise_is_noise() {
     }
 }
 
-/// Ring-downs with a second mode, fitted with constants: an adequate fit has the right frequency and damping ratio.
+/// Ring-downs of 5 to 50 periods with a second mode of 0.1 to 3 % and noise of 0.1 to 1 %, fitted with constants: an adequate fit has the right
+/// frequency and damping ratio. In every fourth the mode is at 1.12 f: half a beat of it or less, of the size of the noise, moves the damping ratio
+/// by up to 3.7 half-widths and leaves white residuals, which no criterion tells from those of one mode.
 #[test]
 #[ignore = "200 records"]
 fn a_second_mode_does_not_spoil_an_adequate_fit() {
@@ -225,7 +226,7 @@ fn a_second_mode_does_not_spoil_an_adequate_fit() {
     for seed in 0..cases(200) {
         let mut random = ChaCha8Rng::seed_from_u64(7000 + seed);
         let mut between = |low: f64, high: f64| random.random_range(low..high);
-        let multiple = if seed % 2 == 0 {
+        let multiple = if seed % 4 == 0 {
             1.12
         } else {
             between(1.5, 4.0)
@@ -236,7 +237,7 @@ fn a_second_mode_does_not_spoil_an_adequate_fit() {
             is_free: true,
             seed,
             periods: 5.0 * 10f64.powf(between(0.0, 1.0)),
-            noise: SMALL_NOISE,
+            noise: 0.001 * 10f64.powf(between(0.0, 1.0)),
             phi: 0.0,
             // 0.1 to 3 %
             times: 30f64.powf(between(-1.0, 0.0)),
@@ -273,45 +274,54 @@ fn a_second_mode_does_not_spoil_an_adequate_fit() {
 }
 
 /// Intervals of frequency, damping ratio and stiffness (means over the record, of the linear part) that hold the truth once what is preferred has
-/// been added, whether it is right or not.
-#[test]
-#[ignore = "200 records of each of 33 kinds take long"]
-fn intervals_hold_after_the_choice() {
+/// been added, whether it is right or not. `docs/theory.md` has the kinds below 88 %.
+fn coverage(kind: Kind, is_free: bool) {
+    let (mut all, mut stated, mut inside) = (0, 0, [0; 3]);
+    for seed in 0..cases(200) {
+        let case = case(kind, is_free, seed);
+        let made = case.made();
+        let Some((fitted, added)) = Fitted::selected(&made.problem()) else {
+            println!("{case:?}: no fit");
+            continue;
+        };
+        let errors = [0, 1, 2].map(|i| fitted.error(NAMES[i], made.truth[i]));
+        all += 1;
+        stated += usize::from(errors[0].is_some());
+        for (inside, error) in inside.iter_mut().zip(errors) {
+            *inside += usize::from(error.is_some_and(|error| error.abs() <= 1.0));
+        }
+        if shows() {
+            println!("{case:?}: {added} {:?} {errors:.2?}", fitted.level());
+        }
+    }
+    let share = |held: usize| format!("{:.0} %", 100.0 * held as f64 / stated as f64);
+    let [frequency, ratio, stiffness] = inside.map(share);
+    let motion = if is_free { "free" } else { "forced" };
+    println!("| {kind:?} | {motion} | {all} | {stated} | {frequency} | {ratio} | {stiffness} |");
+    let is_clean = kind == Kind::Clean;
+    let least = inside.into_iter().min().unwrap_or_default();
+    assert!(!is_clean || 100 * least >= 88 * stated, "{inside:?}");
+}
+
+fn print_head_of_coverage() {
     println!(
         "| kind | motion | records | with intervals | frequency | damping ratio | stiffness |"
     );
     println!("|---|---|---|---|---|---|---|");
-    let free = [Kind::Clean]
-        .into_iter()
-        .chain(FREE)
-        .map(|kind| (kind, true));
-    let forced = [Kind::Clean].into_iter().chain(FORCED);
-    for (kind, is_free) in free.chain(forced.map(|kind| (kind, false))) {
-        let (mut all, mut stated, mut inside) = (0, 0, [0; 3]);
-        for seed in 0..cases(200) {
-            let case = case(kind, is_free, seed);
-            let made = case.made();
-            let Some((fitted, added)) = Fitted::selected(&made.problem()) else {
-                println!("{case:?}: no fit");
-                continue;
-            };
-            let errors = [0, 1, 2].map(|i| fitted.error(NAMES[i], made.truth[i]));
-            all += 1;
-            stated += usize::from(errors[0].is_some());
-            for (inside, error) in inside.iter_mut().zip(errors) {
-                *inside += usize::from(error.is_some_and(|error| error.abs() <= 1.0));
-            }
-            if shows() {
-                println!("{case:?}: {added} {:?} {errors:.2?}", fitted.level());
-            }
-        }
-        let share = |i: usize| format!("{:.0} %", 100.0 * inside[i] as f64 / stated as f64);
-        let motion = if is_free { "free" } else { "forced" };
-        println!(
-            "| {kind:?} | {motion} | {all} | {stated} | {} | {} | {} |",
-            share(0),
-            share(1),
-            share(2)
-        );
-    }
+}
+
+#[test]
+#[ignore = "200 records of each of 14 kinds take an hour"]
+fn intervals_after_the_choice_in_free_decays() {
+    print_head_of_coverage();
+    let all = [Kind::Clean].into_iter().chain(FREE);
+    all.for_each(|kind| coverage(kind, true));
+}
+
+#[test]
+#[ignore = "200 records of each of 19 kinds take an hour"]
+fn intervals_after_the_choice_under_a_force() {
+    print_head_of_coverage();
+    let all = [Kind::Clean].into_iter().chain(FORCED);
+    all.for_each(|kind| coverage(kind, false));
 }
