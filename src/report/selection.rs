@@ -78,14 +78,15 @@ fn with(
     let overrides = Override::parse_all(&set).ok()?;
     let file = now.file.clone().with_overrides(&overrides).ok()?;
     let mut model = build(&file, BuildMode::Fit).ok()?;
-    let named = match best.parameters_by_name.as_slice() {
-        [] => {
-            let before = &now.fit.fit.best.parameters;
-            &now.fit.model.problem.functions.named(before)
-        }
-        found => found,
+    let functions = &model.problem.functions;
+    let start = match best.parameters_by_name.is_empty() {
+        // Noise of an input changes no parameter.
+        true => functions.start_at(
+            &now.fit.model.problem.functions,
+            &now.fit.fit.best.parameters,
+        ),
+        false => best.start(functions),
     };
-    let start = model.problem.functions.start_of(named);
     model.problem = (model.problem)
         .with(|parts| parts.functions.set_start(&start))
         .ok()?;

@@ -141,9 +141,9 @@ fn change(
                 kind.name()
             )
         }
-        Addition::Variation { function, degree } => {
+        Addition::Variation { function, next, .. } => {
             format!(
-                "functions.{}={{basis: polynomial, degree: {degree}}}",
+                "functions.{}={{basis: polynomial, degree: {next}}}",
                 key(function)?
             )
         }

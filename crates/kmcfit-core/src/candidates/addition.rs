@@ -21,6 +21,8 @@ pub enum Addition {
         function: usize,
         /// Degree of the polynomial.
         degree: usize,
+        /// Degree of the polynomial that a model with it [has](super::Candidate::added_to).
+        next: usize,
     },
     /// A function with a multiple of its intervals between knots, or a polynomial of a higher degree.
     FinerBasis {
@@ -171,7 +173,9 @@ impl Addition {
                 start[problem.functions.scalar_range().start] = *further.first()?;
                 Some((changed, start))
             }
-            Self::Variation { function, degree } => {
+            Self::Variation {
+                function, degree, ..
+            } => {
                 let basis = Basis::Polynomial { degree };
                 let own = &theta[problem.functions.ranges()[function].clone()];
                 let mut start = own.to_vec();

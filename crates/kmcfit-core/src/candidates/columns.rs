@@ -166,6 +166,7 @@ fn of_structure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Op
                 let of_time = Addition::Variation {
                     function: index,
                     degree,
+                    next: 2 * degree,
                 };
                 (of_time, Basis::Polynomial { degree })
             }
@@ -211,6 +212,7 @@ fn of_structure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Op
                 addition: Addition::Variation {
                     function,
                     degree: 1,
+                    next: DEGREE,
                 },
                 columns: columns(first..first + 1),
                 searched: 0,

@@ -9,7 +9,7 @@
 
 use super::jump_basis::is_jump;
 use super::penalised_misfit::Linearised;
-use super::{Candidate, Candidates, GAIN};
+use super::{Addition, Candidate, Candidates, GAIN};
 use crate::alternatives::{Refit, with_functions};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::objective::Evaluation;
@@ -27,6 +27,7 @@ pub(super) fn of(
     let held = held_by_penalties(problem, theta, evaluation);
     let price = (problem.sample_count() as f64).ln();
     let own = Linearised::at(problem, evaluation).own().misfit - held * price;
+    let own = own.min(with_half_degrees(problem, theta).unwrap_or(own));
     let refit = Refit::of(constants, &start)?;
     let alone = Linearised::at(&refit.problem, refit.evaluation()).own();
     // Where constants alone are as good, a function that varies is a finer basis than the samples need, and no wrong one.
@@ -50,6 +51,31 @@ pub(super) fn of(
     Some(all.collect())
 }
 
+/// Penalised misfit with half the degree of each polynomial, which a model with a [candidate](super::Candidate::added_to) has: its higher degrees
+/// are for the intervals, and no reason for constants. `None` without one.
+fn with_half_degrees(problem: &Problem, theta: &[f64]) -> Option<f64> {
+    problem.penalties.is_empty().then_some(())?;
+    let (mut halved, mut start) = (problem.clone(), theta.to_vec());
+    for function in 0..problem.functions.ranges().len() {
+        let Some(Basis::Polynomial { degree }) = halved.functions.get(function).basis else {
+            continue;
+        };
+        let addition = Addition::Variation {
+            function,
+            degree: degree.div_ceil(2),
+            next: degree,
+        };
+        (halved, start) = addition.added(&halved, &start, &[])?;
+    }
+    (start.len() < theta.len()).then_some(())?;
+    let refit = Refit::of(halved, &start)?;
+    Some(
+        Linearised::at(&refit.problem, refit.evaluation())
+            .own()
+            .misfit,
+    )
+}
+
 /// Parameters that penalties hold.
 fn held_by_penalties(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
     if problem.penalties.is_empty() {
@@ -64,7 +90,7 @@ fn held_by_penalties(problem: &Problem, theta: &[f64], evaluation: &Evaluation) 
 }
 
 /// The problem with a constant for each function that can vary, and its start at their medians; `None` where none can.
-fn constants(problem: &Problem, theta: &[f64]) -> Option<(Problem, Vec<f64>)> {
+pub(super) fn constants(problem: &Problem, theta: &[f64]) -> Option<(Problem, Vec<f64>)> {
     let functions = &problem.functions;
     let grid = &problem.system.grid;
     let values = functions.values(theta);

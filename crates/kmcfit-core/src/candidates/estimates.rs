@@ -27,7 +27,9 @@ pub(super) fn estimates(
             let i = problem.functions.scalar_range().start;
             vec![one(kind.name(), kind.unit(), i)]
         }
-        Addition::Variation { function, degree } => {
+        Addition::Variation {
+            function, degree, ..
+        } => {
             let own = problem.functions.get(function);
             let first = problem.functions.ranges()[function].start;
             let unit = own.quantity.unit();

@@ -18,6 +18,8 @@ const ROUNDS: usize = 6;
 /// Number of times to which a jump may move in one round, and cells on either side of it in the next.
 const TIMES: usize = 24;
 const BESIDE: f64 = 2.0;
+/// Decrease of the penalised misfit by a refit from which another follows: a sixth of what decides.
+const SETTLED: f64 = 1.0;
 
 /// Changes of a level, as shares of it, from which a jump is refitted where the response leaves that of the beginning.
 const CHANGES: [f64; 8] = [-0.4, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.4];
@@ -96,25 +98,16 @@ fn from(
     let (mut time, mut change, mut start) = (time, change, theta.to_vec());
     let mut best: Option<Found> = None;
     for _ in 0..ROUNDS {
-        let addition = Addition::Jump { function, time };
-        let Some(mut found) = plain(problem, &start, addition, &[change]) else {
+        let Some(found) = at(problem, &start, function, time, change) else {
             break;
         };
-        let [before, at, after] = [0, 1, 2].map(|i| found.theta[first + i]);
-        let within = 0.5 - (at - before) / (after - before);
-        let there = node_time(grid, time) + grid.step() * within;
-        found.additions = vec![Addition::Jump {
-            function,
-            time: there,
-        }];
         if best
             .as_ref()
             .is_some_and(|best| found.judged.misfit >= best.judged.misfit)
         {
             break;
         }
-        change = after - before;
-        start = [&found.theta[..=first], &found.theta[first + 3..]].concat();
+        (start, change) = constants(&found, first);
         let moved = moved(problem, &found.theta, function, time, range);
         best = Some(found);
         let Some(moved) = moved else {
@@ -135,7 +128,53 @@ fn from(
         }
         time = moved;
     }
-    best
+    settled(problem, best?, function)
+}
+
+/// Refits from where a refit with a jump ended, with the node nearest to its time, as long as they are better: one that comes from afar ends in
+/// small steps before its minimum.
+fn settled(problem: &Problem, found: Found, function: usize) -> Option<Found> {
+    let first = problem.functions.ranges()[function].start;
+    let mut best = found;
+    for _ in 0..ROUNDS {
+        let (start, change) = constants(&best, first);
+        let [Addition::Jump { time, .. }] = best.additions[..] else {
+            break;
+        };
+        let Some(found) = at(problem, &start, function, time, change) else {
+            break;
+        };
+        let gain = best.judged.misfit - found.judged.misfit;
+        if gain > 0.0 {
+            best = found;
+        }
+        if gain < SETTLED {
+            break;
+        }
+    }
+    Some(best)
+}
+
+/// Refit with a jump at the node nearest to `time`, whose value there states the time.
+fn at(problem: &Problem, start: &[f64], function: usize, time: f64, change: f64) -> Option<Found> {
+    let grid = &problem.system.grid;
+    let first = problem.functions.ranges()[function].start;
+    let addition = Addition::Jump { function, time };
+    let found = plain(problem, start, addition, &[change])?;
+    let [before, at, after] = [0, 1, 2].map(|i| found.theta[first + i]);
+    let within = 0.5 - (at - before) / (after - before);
+    let time = node_time(grid, time) + grid.step() * within;
+    Some(Found {
+        additions: vec![Addition::Jump { function, time }],
+        ..found
+    })
+}
+
+/// The parameters with the level before the jump for that of the function, whose first is `first`, and the change.
+fn constants(found: &Found, first: usize) -> (Vec<f64>, f64) {
+    let theta = &found.theta;
+    let start = [&theta[..=first], &theta[first + 3..]].concat();
+    (start, theta[first + 2] - theta[first])
 }
 
 /// The time within a range at which a jump has the least squares, by one linearisation at the parameters `theta` with a jump at `time`.

@@ -9,6 +9,7 @@
 //! A gain of 6 is posterior odds of 20 to 1 for a candidate: over all of them at most 2 in 100 records from 100 samples on have one by chance.
 
 mod addition;
+mod adopted;
 mod columns;
 mod constants;
 mod early;

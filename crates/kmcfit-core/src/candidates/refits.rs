@@ -1,6 +1,5 @@
 //! Refits of the most promising candidates.
 
-use super::COLOURED;
 use super::addition::{Addition, Family};
 use super::columns::LinearCandidate;
 use super::early;
@@ -8,6 +7,7 @@ use super::found::{Found, plain};
 use super::jump;
 use super::penalised_misfit::{Judged, Linearised};
 use super::predictions;
+use super::{COLOURED, GAIN};
 use crate::alternatives::{Clock, RecordParameter, Refit, on_best_clock, with_samples_of};
 use crate::problem::Problem;
 use crate::simd::sum::rms;
@@ -39,7 +39,17 @@ pub(super) fn refits(
     let mut found: Vec<Found> = found.into_iter().flatten().collect();
     let is_free = problem.experiments.iter().all(|e| e.is_free());
     if is_free && own.order >= COLOURED {
-        let pairs = pairs(problem, theta, &found, linear);
+        let mut pairs = pairs(problem, theta, &found, linear);
+        // What the second of a pair adds is judged as what the first does.
+        pairs.retain(|pair| {
+            let has = |single: &&Found| {
+                pair.additions
+                    .iter()
+                    .any(|a| a.is_like(single.additions[0]))
+            };
+            let mut singles = found.iter().filter(has);
+            singles.all(|single| single.judged.misfit - pair.judged.misfit >= GAIN)
+        });
         found.extend(pairs);
     }
     found
@@ -166,7 +176,7 @@ fn ladder(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
     }
     let lowest = &DEGREES[1..];
     let degree = lowest[0];
-    let addition = Addition::Variation { function, degree };
+    let addition = variation(function, degree, most);
     let from_beginning = || {
         let quarter = early::of_first_quarter(problem, theta)?;
         let (changed, start) = addition.added(problem, &quarter, &[0.0])?;
@@ -178,6 +188,16 @@ fn ladder(problem: &Problem, theta: &[f64], function: usize) -> Option<Found> {
     };
     let both = best.into_iter().chain(from_beginning());
     both.min_by(|a, b| a.judged.misfit.total_cmp(&b.judged.misfit))
+}
+
+/// A function that varies, of at most this degree; a degree of 2 needs no more.
+fn variation(function: usize, degree: usize, most: f64) -> Addition {
+    let is_slow = degree == 1 || (2 * degree) as f64 <= most;
+    Addition::Variation {
+        function,
+        degree,
+        next: if is_slow { 2 * degree } else { degree },
+    }
 }
 
 /// Refits with finer and finer bases, as long as these are better.
@@ -215,7 +235,7 @@ fn climb(
         if degree > 1 && degree as f64 > most {
             break;
         }
-        let addition = Addition::Variation { function, degree };
+        let addition = variation(function, degree, most);
         let Some(found) = plain(problem, &theta, addition, &further) else {
             break;
         };

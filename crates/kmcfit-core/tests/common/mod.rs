@@ -4,8 +4,10 @@
 pub mod closed_form;
 pub mod counts;
 pub mod forced;
+pub mod lacking;
 pub mod properties;
 pub mod reference;
+pub mod selected;
 pub mod sensed;
 pub mod synthetic;
 

@@ -6,6 +6,7 @@ mod rational;
 
 mod activity;
 mod bases;
+mod candidates;
 mod chain;
 mod channels;
 mod closed_forms;
