@@ -129,7 +129,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
     $ kmcfit fit model.yaml --jsn
     error: kmcfit fit: unknown argument
       found: `--jsn`
-      expected: one of: --out, --set, --json, --no-report, --tables, --verbose, --strict, --no-plot
+      expected: one of: --out, --set, --json, --no-report, --tables, --select, --verbose, --strict, --no-plot
       hint: did you mean `--json`?
 
     $ kmcfit fit model.yaml other.yaml
