@@ -5,7 +5,6 @@ use super::suggestions::overrides_of;
 use super::{CompletedFit, RequestedFiles};
 use crate::config::{BuildMode, ModelFile, Override, build};
 use crate::fitting::fit_model;
-use kmcfit_core::assessment::Doubt;
 use kmcfit_core::candidates::Candidate;
 use kmcfit_core::solvers::{Initial, IterationRecord, Observer, Status};
 use std::sync::atomic::Ordering;
@@ -59,14 +58,7 @@ pub fn select(file: &ModelFile, fit: CompletedFit, requested: RequestedFiles) ->
 
 /// The candidate that is preferred to the model of a document.
 fn preferred(document: &ResultDocument) -> Option<Candidate> {
-    let is_stated = document.doubts().any(|doubt| {
-        matches!(
-            doubt,
-            Doubt::Preferred { .. } | Doubt::DisturbedInput { .. }
-        )
-    });
-    let candidates = document.candidates.as_ref().filter(|_| is_stated);
-    candidates?.preferred().cloned()
+    document.candidates.as_ref()?.preferred().cloned()
 }
 
 fn with(

@@ -59,11 +59,7 @@ impl Fitted {
     }
 
     fn preferred(&self) -> Option<Candidate> {
-        let mut warnings = self.assessment.plausibility.warnings.iter();
-        warnings.find_map(|doubt| match doubt {
-            Doubt::Preferred { candidates } => candidates.first().cloned(),
-            _ => None,
-        })
+        self.assessment.candidates.as_ref()?.preferred().cloned()
     }
 
     pub fn level(&self) -> VerdictLevel {
