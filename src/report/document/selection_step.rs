@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 pub struct SelectionStep {
     /// What was added, in words.
     pub added: String,
+    /// What is as good, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub as_good: Vec<String>,
     /// Its gain.
     pub gain: f64,
     /// What the addition estimated when it was made.

@@ -52,7 +52,7 @@ fn ladder(document: &ResultDocument) -> String {
     };
     let row = |(i, step): (usize, &SelectionStep)| {
         vec![
-            format!("{}. {}", i + 1, step.added),
+            format!("{}. {}", i + 1, stated(step)),
             short(step.gain),
             change(step.natural_frequency),
             change(step.damping_ratio),
@@ -63,6 +63,14 @@ fn ladder(document: &ResultDocument) -> String {
     paragraph(
         "What --select added to the model of the file, until no candidate was preferred, and what each addition changed.",
     ) + &table("Additions", &headings, &rows)
+}
+
+/// What was added, and what is as good.
+fn stated(step: &SelectionStep) -> String {
+    match step.as_good.as_slice() {
+        [] => step.added.clone(),
+        others => format!("{}; as good: {}", step.added, others.join(", ")),
+    }
 }
 
 /// Each candidate with its gain and what it estimates.
