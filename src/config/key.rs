@@ -29,6 +29,8 @@ pub enum ValueType {
     Map(&'static KeyGroup),
     /// A list.
     List(&'static ValueType),
+    /// A map from names that the user gives to such values.
+    Names(&'static ValueType),
     /// One of several kinds.
     AnyOf(&'static [ValueType]),
 }
@@ -76,7 +78,7 @@ impl ValueType {
     pub fn groups(self) -> Vec<&'static KeyGroup> {
         match self {
             ValueType::Map(group) => vec![group],
-            ValueType::List(inner) => inner.groups(),
+            ValueType::List(inner) | ValueType::Names(inner) => inner.groups(),
             ValueType::AnyOf(kinds) => kinds.iter().flat_map(|kind| kind.groups()).collect(),
             _ => Vec::new(),
         }
@@ -179,6 +181,10 @@ impl Keys {
                 [one] => *one,
                 _ => ValueType::AnyOf(kinds.leak()),
             };
+        }
+        if schema["additionalProperties"].is_object() {
+            let inner = self.kind(&schema["additionalProperties"]);
+            return ValueType::Names(Box::leak(Box::new(inner)));
         }
         // The first type of an optional value is its own.
         let kind = schema["type"].as_str().or(schema["type"][0].as_str());

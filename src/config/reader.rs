@@ -103,6 +103,22 @@ impl<'a> Typed<'a> {
         }
     }
 
+    /// Values of its type by names: a list of pairs, which keeps their order.
+    fn names<'de, A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
+        let mut read: Vec<String> = Vec::new();
+        let mut pairs = Vec::new();
+        while let Some(name) = map.next_key::<String>()? {
+            if read.contains(&name) {
+                return Err(self.report.raise(Mistake::RepeatedKey(name)));
+            }
+            let value = || map.next_value_seed(self);
+            let value = self.report.below(&format!(".{name}"), value)?;
+            pairs.push(Value::Array(vec![Value::String(name.clone()), value]));
+            read.push(name);
+        }
+        Ok(Value::Array(pairs))
+    }
+
     fn of(self, kind: ValueType, is_optional: bool) -> Self {
         Self {
             kind,
@@ -163,6 +179,13 @@ impl<'de> Visitor<'de> for Typed<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
+        let named = self.kinds().iter().find_map(|kind| match kind {
+            ValueType::Names(inner) => Some(**inner),
+            _ => None,
+        });
+        if let Some(inner) = named {
+            return self.of(inner, false).names(map);
+        }
         let mut kinds = self.kinds().iter();
         let group = kinds.find_map(|kind| match kind {
             ValueType::Map(group) => Some(*group),
@@ -177,7 +200,7 @@ impl<'de> Visitor<'de> for Typed<'_> {
         while let Some(i) = map.next_key_seed(NextKey { keys, report })? {
             let key = &keys[i];
             if std::mem::replace(&mut read[i], true) {
-                return Err(report.raise(Mistake::RepeatedKey(key.name)));
+                return Err(report.raise(Mistake::RepeatedKey(key.name.to_owned())));
             }
             let value = || map.next_value_seed(self.of(key.kind, key.nullable));
             let value = report.below(&format!(".{}", key.name), value)?;

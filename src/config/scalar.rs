@@ -77,7 +77,7 @@ pub(super) enum Mistake {
         known: Vec<&'static str>,
     },
     MissingKey(&'static str),
-    RepeatedKey(&'static str),
+    RepeatedKey(String),
 }
 
 impl Mistake {
@@ -212,6 +212,7 @@ fn expected(kind: ValueType) -> String {
         ValueType::Word(word) => format!("`{word}`"),
         ValueType::Choice(words) => one_of(words.iter().map(|(name, _)| *name)),
         ValueType::Map(group) => group.expecting.into(),
+        ValueType::Names(_) => "a map of names with a value each".into(),
         ValueType::List(ValueType::Number) => "a list of numbers".into(),
         ValueType::List(_) => "a list: lines that begin with `- `, or [ … ]".into(),
         ValueType::AnyOf(kinds) => {

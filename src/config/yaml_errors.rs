@@ -88,7 +88,7 @@ impl YamlError<'_> {
         match mistake {
             Mistake::UnknownKey { key, known } => self.unknown_key(&key, &known),
             Mistake::MissingKey(key) => self.missing_key(key),
-            Mistake::RepeatedKey(key) => self.repeated_key(key),
+            Mistake::RepeatedKey(key) => self.repeated_key(&key),
             Mistake::Value {
                 problem,
                 found,

@@ -170,6 +170,7 @@ fn kind(kind: ValueType) -> String {
         ValueType::Word(word) => format!("`{word}`"),
         ValueType::Choice(_) => "one of the values below".into(),
         ValueType::Map(_) => "a map with the keys below".into(),
+        ValueType::Names(_) => "a map of names, each with the keys below".into(),
         ValueType::List(ValueType::Map(_)) => "a list of maps with the keys below".into(),
         ValueType::List(ValueType::Number) => "a list of numbers".into(),
         ValueType::List(ValueType::Text) => "a list of texts".into(),

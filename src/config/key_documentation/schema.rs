@@ -95,6 +95,9 @@ fn kind(kind: ValueType) -> Value {
         }
         ValueType::Map(group) => reference(group),
         ValueType::List(inner) => json!({"type": "array", "items": self::kind(*inner)}),
+        ValueType::Names(inner) => {
+            json!({"type": "object", "additionalProperties": self::kind(*inner)})
+        }
         ValueType::AnyOf(kinds) => {
             let kinds: Vec<Value> = kinds.iter().map(|k| self::kind(*k)).collect();
             json!({"anyOf": kinds})

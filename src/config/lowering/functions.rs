@@ -9,7 +9,7 @@ use kmcfit_core::constraints::TimeHistory;
 use kmcfit_core::identifiability::{ScaleSource, scale_source};
 use kmcfit_core::model::{
     Bound, ByCoefficient, CoefficientSpec, ColumnSpec, ExperimentSpec, KnownValue, KnownValueMap,
-    NumberOrColumn, OneOrList, StartSpec,
+    NumberOrColumn, OneOrList, StartSpec, StructureSpec,
 };
 use kmcfit_core::problem::Problem;
 use kmcfit_core::structure::CoefficientKind;
@@ -24,7 +24,8 @@ pub(super) type Given<'a> = (CoefficientKind, &'a CoefficientSpec);
 
 /// The functions common to all experiments, mass first.
 pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
-    file.spec.functions.iter().collect()
+    let functions = file.spec.functions.iter();
+    functions.flat_map(ByCoefficient::iter).collect()
 }
 
 /// The functions of an experiment alone.
@@ -32,6 +33,31 @@ pub(super) fn own(spec: &ExperimentSpec) -> Vec<Given<'_>> {
     (spec.functions.iter())
         .flat_map(ByCoefficient::iter)
         .collect()
+}
+
+/// The structure of a model with the columns of its functions at the nodes.
+pub(super) fn structure(
+    file: &ModelFile,
+    given: &StructureSpec,
+    grid: &Grid,
+    defaults: Defaults<'_>,
+) -> Result<StructureSpec, InputError> {
+    let mut structure = given.clone();
+    for (name, coordinate) in &mut structure.coordinates.0 {
+        let at = ModelKey::new(file, format!("structure.coordinates.{name}.mass"));
+        let mass = (CoefficientKind::MASS, &coordinate.mass);
+        coordinate.mass = specification(&at, grid, mass, defaults)?;
+    }
+    for (name, element) in &mut structure.elements.0 {
+        let at = ModelKey::new(file, format!("structure.elements.{name}"));
+        // An element without a law is refused where it is built.
+        let kind = element
+            .laws
+            .first()
+            .map_or(CoefficientKind::STIFFNESS, |(kind, _)| *kind);
+        element.coefficient = specification(&at, grid, (kind, &element.coefficient), defaults)?;
+    }
+    Ok(structure)
 }
 
 /// All functions of the model.
@@ -133,7 +159,8 @@ pub(super) fn read_column(
 
 /// True if the model states that the mass is unknown.
 pub(super) fn has_unknown_mass(file: &ModelFile) -> bool {
-    let mass = file.spec.functions.get(CoefficientKind::MASS);
+    let functions = file.spec.functions.as_ref();
+    let mass = functions.and_then(|all| all.get(CoefficientKind::MASS));
     mass.is_some_and(|mass| matches!(mass.fixed, Some(KnownValue::Unknown(_))))
 }
 

@@ -162,7 +162,15 @@ fn builder(
         Ok((given.0, spec))
     });
     let shared = shared.collect::<Result<_, _>>()?;
-    let mut builder = Builder::of(shared).grid(*grid).solver(solver);
+    let builder = match &file.spec.structure {
+        None => Builder::of(shared),
+        Some(given) => {
+            let structure = functions::structure(file, given, grid, defaults)?;
+            let built = Builder::structure(&structure);
+            built.map_err(|error| input_error(file, error))?
+        }
+    };
+    let mut builder = builder.grid(*grid).solver(solver);
     builder = builder.method(grid::method(file));
     if matches!(mode, BuildMode::Simulate { .. }) {
         builder = builder.simulation();
@@ -247,6 +255,29 @@ struct Known {
     source: ModelSource,
 }
 
+/// Error for a model without a system or with two, and for keys that a structure does not have.
+fn check_system(file: &ModelFile) -> Result<(), InputError> {
+    let spec = &file.spec;
+    let of_one = [
+        ("functions", spec.functions.is_some()),
+        ("constraints", spec.constraints.is_some()),
+        ("truth", spec.truth.is_some()),
+        ("predict", spec.predict.is_some()),
+        ("study", spec.study.is_some()),
+    ];
+    let given = of_one.iter().find(|(_, is_given)| *is_given);
+    match (&spec.structure, &spec.functions, given) {
+        (None, None, _) => Err(file
+            .error_at("", "the model has no system")
+            .expected("`functions` of one coordinate, or `structure`")),
+        (Some(_), _, Some((key, _))) => Err(file
+            .error_at(key, format!("`{key}` concerns a system of one coordinate"))
+            .found(format!("`structure` and `{key}`"))
+            .expected("one of the two")),
+        _ => Ok(()),
+    }
+}
+
 /// Builds the model of a file in a mode.
 ///
 /// # Errors
@@ -264,6 +295,7 @@ fn build_on(
     known: Option<Known>,
 ) -> Result<Model, InputError> {
     let clock = Instant::now();
+    check_system(file)?;
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
     let mut automatic = Vec::new();

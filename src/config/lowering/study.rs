@@ -301,7 +301,10 @@ fn candidate(
     let mut experiment = Experiment::free(spec.name.clone(), initial, nodes);
     if let Some(force) = &spec.force {
         let force = Some(Waveform::Shape(experiments::shape(at, force)?));
-        experiment.input = Input { force, base: None };
+        experiment.input = Input {
+            force,
+            ..Input::default()
+        };
         experiment.excitation = Some(experiment.input.on(grid, nodes));
     }
     let kind = spec.channel.unwrap_or(ChannelKind::Displacement);

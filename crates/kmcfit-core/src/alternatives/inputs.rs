@@ -68,11 +68,11 @@ pub(crate) fn with_input(
     let input = match input {
         InputQuantity::Force => Input {
             force: Some(Waveform::Samples(signal)),
-            base: None,
+            ..Input::default()
         },
         InputQuantity::BaseAcceleration => Input {
-            force: None,
             base: Some(BaseMotion::Acceleration(signal)),
+            ..Input::default()
         },
     };
     experiment.excitation = Some(input.on(&grid, experiment.nodes));

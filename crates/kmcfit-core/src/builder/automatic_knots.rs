@@ -65,7 +65,9 @@ impl Builder {
             .min(slow)
             .max(1);
         let own = next.records.iter_mut().flat_map(|r| &mut r.coefficients);
-        for (_, spec) in next.coefficients.iter_mut().chain(own) {
+        let own = own.map(|(_, spec)| spec);
+        let shared = next.functions.iter_mut().map(|function| &mut function.spec);
+        for spec in shared.chain(own) {
             if spec.has_automatic_knots() {
                 spec.knots = Some(KnotSpec::Count(intervals + 1));
                 if spec.penalties().is_empty() {

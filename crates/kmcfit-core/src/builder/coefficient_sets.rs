@@ -5,12 +5,41 @@ use super::{BuildError, Builder};
 use crate::functions::{CoefficientKind, CoefficientSet};
 use crate::model::{CoefficientSpec, KnownValue};
 use crate::solvers::Solver;
+use crate::structure::Ends;
 use std::borrow::Cow;
+
+/// A function of the system: the mass of a coordinate, or the coefficient of an element.
+#[derive(Debug, Clone)]
+pub(super) struct Function {
+    /// Key, such as `functions.mass` or `structure.elements.storey_1`.
+    pub key: String,
+    /// Name, which is that of the kind without a structure.
+    pub name: String,
+    pub kind: CoefficientKind,
+    pub spec: CoefficientSpec,
+    /// The combination of coordinates on which it acts.
+    pub ends: Ends,
+}
+
+impl Function {
+    /// That of a system of one coordinate.
+    pub fn one((kind, spec): (CoefficientKind, CoefficientSpec)) -> Self {
+        Self {
+            key: format!("functions.{}", kind.name()),
+            name: kind.name().to_owned(),
+            kind,
+            spec,
+            ends: Ends::ground(0),
+        }
+    }
+}
 
 /// A coefficient function of a builder, with its key.
 pub(super) struct FunctionEntry<'a> {
     /// Key, such as `functions.mass` or `experiments[1].functions.damping`.
     pub key: String,
+    /// Name of the shared function.
+    pub name: &'a str,
     pub kind: CoefficientKind,
     pub spec: Cow<'a, CoefficientSpec>,
     /// Index of the record with its own function; `None` for a shared one.
@@ -73,10 +102,11 @@ impl Builder {
 
     /// The specified functions, of all records and of single ones.
     fn given(&self) -> Vec<FunctionEntry<'_>> {
-        let shared = (self.coefficients.iter()).map(|(kind, spec)| FunctionEntry {
-            key: format!("functions.{}", kind.name()),
-            kind: *kind,
-            spec: Cow::Borrowed(spec),
+        let shared = self.functions.iter().map(|function| FunctionEntry {
+            key: function.key.clone(),
+            name: &function.name,
+            kind: function.kind,
+            spec: Cow::Borrowed(&function.spec),
             owner: None,
             is_known_part: false,
         });
@@ -86,6 +116,7 @@ impl Builder {
                 .iter()
                 .map(move |(kind, spec)| FunctionEntry {
                     key: format!("experiments[{i}].functions.{}", kind.name()),
+                    name: kind.name(),
                     kind: *kind,
                     spec: Cow::Borrowed(spec),
                     owner: Some(i),
@@ -103,7 +134,7 @@ impl Builder {
         }
         self.check_known(&entries)?;
         self.check_stiffness()?;
-        let shared: Vec<usize> = (0..self.coefficients.len()).collect();
+        let shared: Vec<usize> = (0..self.functions.len()).collect();
         let known_of = |owner: Option<usize>| {
             let known = entries.iter().enumerate();
             known.filter(move |(_, entry)| entry.is_known_part && entry.owner == owner)
@@ -113,7 +144,7 @@ impl Builder {
             of_shared.push((self.shared_index(entry)?, f));
         }
         let mut found = CoefficientSets {
-            sets: vec![CoefficientSet::from(shared.clone()).with_known_parts(of_shared.clone())],
+            sets: vec![self.set_of(shared.clone(), of_shared.clone())],
             of_record: Vec::new(),
         };
         for (i, record) in self.records.iter().enumerate() {
@@ -140,7 +171,7 @@ impl Builder {
                     false => set[position] = f,
                 }
             }
-            let set = CoefficientSet::from(set).with_known_parts(known);
+            let set = self.set_of(set, known);
             let before = found.sets.iter().position(|s| *s == set);
             found.of_record.push(before.unwrap_or(found.sets.len()));
             if before.is_none() {
@@ -149,6 +180,16 @@ impl Builder {
         }
         check_shared(&entries, &found)?;
         Ok(found)
+    }
+
+    /// A coefficient set of functions and known parts, the masses first.
+    fn set_of(&self, functions: Vec<usize>, known_parts: Vec<(usize, usize)>) -> CoefficientSet {
+        let masses = self
+            .functions
+            .iter()
+            .filter(|f| f.kind == CoefficientKind::MASS);
+        let set = CoefficientSet::from(functions).with_inertias(masses.count());
+        set.with_known_parts(known_parts)
     }
 
     /// Error for a known part that is not known, beside a fixed value, or without the likelihood that its standard deviation needs.
@@ -188,8 +229,9 @@ impl Builder {
             CoefficientKind::CUBIC_STIFFNESS,
             CoefficientKind::QUINTIC_STIFFNESS,
         ];
-        let mut kinds = self.coefficients.iter().map(|(kind, _)| kind);
-        if kinds.any(|kind| stiffening.contains(kind)) {
+        // Others may hold a spring of a structure.
+        let mut kinds = self.functions.iter().map(|function| &function.kind);
+        if self.coordinates.len() > 1 || kinds.any(|kind| stiffening.contains(kind)) {
             return Ok(());
         }
         for entry in self.given() {
@@ -211,9 +253,9 @@ impl Builder {
 
     /// Index of the shared function that a record replaces.
     fn shared_index(&self, entry: &FunctionEntry) -> Result<usize, BuildError> {
-        let mut kinds = self.coefficients.iter().map(|(kind, _)| *kind);
-        let Some(position) = kinds.position(|kind| kind == entry.kind) else {
-            let name = entry.kind.name();
+        let mut names = self.functions.iter().map(|function| &function.name);
+        let Some(position) = names.position(|name| name == entry.name) else {
+            let name = entry.name;
             return Err(
                 BuildError::new(&entry.key, "the system has no such function")
                     .found(format!("`{name}` in one experiment only"))
@@ -225,7 +267,7 @@ impl Builder {
         if entry.kind != CoefficientKind::COULOMB_FRICTION {
             return entry.width().map(|_| position);
         }
-        let shared = self.coefficients[position].1.width;
+        let shared = self.functions[position].spec.width;
         match entry.spec.width {
             Some(width) if shared != Some(width) => {
                 let problem = "the width of Coulomb friction is shared by all experiments";

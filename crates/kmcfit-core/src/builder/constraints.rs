@@ -19,6 +19,8 @@ pub(super) struct StatedConstraint {
     pub soft: Option<f64>,
     /// Index of the coefficient set.
     pub coefficient_set: usize,
+    /// Index of its function; `None` for the first of each kind in the set.
+    pub function: Option<usize>,
 }
 
 /// Name of a group of rows, with the key of its constraint.
@@ -28,9 +30,10 @@ pub(super) struct RowKey {
     key: String,
 }
 
-/// Constraints from the bounds of a function with the nodal values `start`.
+/// Constraints from the bounds of the function `function` with the nodal values `start`.
 pub(super) fn of_bounds(
     entry: &FunctionEntry,
+    function: usize,
     start: &[f64],
     coefficient_set: usize,
 ) -> Vec<StatedConstraint> {
@@ -41,6 +44,7 @@ pub(super) fn of_bounds(
         statement: Constraint::Bounds { of, min, max },
         soft: None,
         coefficient_set,
+        function: Some(function),
     };
     match (min, max) {
         (None, None) => Vec::new(),
@@ -90,7 +94,11 @@ impl Builder {
             }
         }
         let statement = &constraint.statement;
-        let rows = statement.build_for(&grid, &problem.functions, constraint.coefficient_set);
+        let (functions, set) = (&problem.functions, constraint.coefficient_set);
+        let rows = match constraint.function {
+            Some(function) => statement.build_of(&grid, functions, set, function),
+            None => statement.build_for(&grid, functions, set),
+        };
         let mut rows = rows.map_err(|why| impossible(key, why))?;
         if rows.is_empty() {
             notices.push(BuildNotice::AlwaysHolds { key: key.clone() });

@@ -1,8 +1,8 @@
 //! Builds the experiments of a problem from records: initial state, force and base motion, sensors, and the scalar parameters
 //! to be estimated.
 
-use super::BuildError;
 use super::record::{ChannelSpec, Record};
+use super::{BuildError, Builder};
 use crate::functions::{ScalarParameter, ScalarValue};
 use crate::model::{DelayValue, EstimateSpec, ScalarSpec, SensorSpec};
 use crate::objective::state_scales;
@@ -21,10 +21,9 @@ pub(super) struct ExperimentBuilder<'a> {
     pub grid: &'a Grid,
     /// Index of the coefficient set.
     pub coefficient_set: usize,
-    /// True if the fit minimises the equation error.
-    pub is_equation_error: bool,
-    /// True if only the response is wanted: no channels are built, and the samples define the span and start values only.
-    pub is_simulation: bool,
+    /// The specification. Of a simulation only the response is wanted: no channels are built, and the samples define the span and start
+    /// values only.
+    pub builder: &'a Builder,
 }
 
 /// A scalar that may be fixed or estimated.
@@ -76,19 +75,29 @@ impl ExperimentBuilder<'_> {
     /// Builds the experiment; its estimated parameters are added to `scalars`.
     pub fn build(&self, scalars: &mut Vec<ScalarParameter>) -> Result<Experiment, BuildError> {
         let record = self.record;
-        let input = record.inputs(&self.key)?;
+        let mut input = record.inputs(&self.key)?;
+        input.last = self.coordinates() - 1;
+        if let Some(name) = &record.force_at {
+            let key = format!("{}.forces[0].at", self.key);
+            input.coordinate = self.builder.coordinate(&key, name)?;
+        }
         let nodes = match record.span() {
             Some([_, end]) => nodes_until(self.grid, end),
             None => self.grid.nodes(),
         };
+        for (name, _) in &record.initial_of {
+            let key = format!("{}.initial.{name}", self.key);
+            self.builder.coordinate(&key, name)?;
+        }
         let (initial, estimated) = self.initial(scalars)?;
         let mut experiment = Experiment::free(&record.name, initial, nodes);
         experiment.initial_parameters = estimated;
         experiment.coefficient_set = self.coefficient_set;
-        experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
+        experiment.excitation =
+            (input.force.is_some() || input.base.is_some()).then(|| input.on(self.grid, nodes));
         experiment.input_error = record.error_of(&input, &self.key)?;
         experiment.input = input;
-        let compared = match self.is_simulation {
+        let compared = match self.builder.is_simulation {
             true => &[][..],
             false => &record.channels,
         };
@@ -96,8 +105,8 @@ impl ExperimentBuilder<'_> {
             [] => ScalarValue::Known(0.0),
             _ => self.input_delay(&experiment.input, scalars)?,
         };
-        for channel in compared {
-            let channel = self.channel(channel, &experiment, input_delay, scalars)?;
+        for (i, channel) in compared.iter().enumerate() {
+            let channel = self.channel((i, channel), &experiment, input_delay, scalars)?;
             experiment.channels.push(channel);
         }
         self.check_delays(&experiment, scalars)?;
@@ -184,35 +193,60 @@ impl ExperimentBuilder<'_> {
         let scales = lowest.filter(|_| !are_known).map_or([1.0; 2], |c| {
             state_scales(c.kind, &c.values, median_spacing(&c.times))
         });
-        let displacement = lowest.filter(|c| c.kind == ChannelKind::Displacement);
+        let is_one = self.coordinates() == 1;
+        let displacement = lowest.filter(|c| is_one && c.kind == ChannelKind::Displacement);
         let starts = [displacement.map_or(0.0, |c| c.values[0]), 0.0];
         let angular = channels.iter().any(|c| c.angular);
         let kinds = [ChannelKind::Displacement, ChannelKind::Velocity];
-        let mut state = [0.0; 2];
-        let mut estimated = [None; 2];
+        let (mut state, mut estimated) = (Vec::new(), Vec::new());
         for (q, kind) in kinds.into_iter().enumerate() {
-            let scalar = PendingScalar {
-                key: format!("{}.initial.{}", self.key, kind.name()),
-                name: format!("initial {} of {}", kind.name(), self.record.name),
-                unit: kind.unit_of(angular),
-                start: starts[q],
-                scale: scales[q],
-            };
-            match scalar.value(initial[q], scalars)? {
-                ScalarValue::Known(number) => state[q] = number,
-                ScalarValue::Estimated(index) => {
-                    estimated[q] = Some(index);
-                    state[q] = scalars[index].start;
-                }
+            for j in 0..self.coordinates() {
+                let coordinate = self.builder.coordinates.get(j);
+                let part = coordinate
+                    .map(|name| format!(".{name}"))
+                    .unwrap_or_default();
+                let of = coordinate
+                    .map(|name| format!(" of {name}"))
+                    .unwrap_or_default();
+                let own = self.record.initial_of.iter();
+                let own = own
+                    .filter(|(name, _)| Some(name) == coordinate)
+                    .map(|(_, state)| state);
+                let scalar = PendingScalar {
+                    key: format!("{}.initial{part}.{}", self.key, kind.name()),
+                    name: format!("initial {}{of} of {}", kind.name(), self.record.name),
+                    unit: kind.unit_of(angular),
+                    start: starts[q],
+                    scale: scales[q],
+                };
+                let value = scalar.value(own.last().unwrap_or(initial)[q], scalars)?;
+                estimated.push(value.index());
+                state.push(match value {
+                    ScalarValue::Known(number) => number,
+                    ScalarValue::Estimated(index) => scalars[index].start,
+                });
             }
         }
-        Ok((State::from(state.to_vec()), estimated.to_vec()))
+        Ok((State::from(state), estimated))
+    }
+
+    /// Number of coordinates.
+    fn coordinates(&self) -> usize {
+        self.builder.coordinates.len().max(1)
+    }
+
+    /// Key of the sensor of channel `i`.
+    fn channel_key(&self, i: usize, channel: &ChannelSpec) -> String {
+        match self.builder.coordinates.is_empty() {
+            true => format!("{}.sensors.{}", self.key, channel.kind.name()),
+            false => format!("{}.channels[{i}]", self.key),
+        }
     }
 
     /// Builds one channel, with the inputs and the base motion at its samples.
     fn channel(
         &self,
-        spec: &ChannelSpec,
+        (i, spec): (usize, &ChannelSpec),
         experiment: &Experiment,
         input_delay: ScalarValue,
         scalars: &mut Vec<ScalarParameter>,
@@ -226,7 +260,7 @@ impl ExperimentBuilder<'_> {
         };
         let sensor = Sensor {
             input_delay,
-            ..self.sensor(spec, scalars)?
+            ..self.sensor((i, spec), scalars)?
         };
         let (shared, values) = (Arc::clone(&spec.times), Arc::clone(&spec.values));
         let nodes = experiment.nodes;
@@ -244,9 +278,12 @@ impl ExperimentBuilder<'_> {
             .with_loss(spec.loss)
             .with_noise_model(spec.noise)
             .with_sensor(sensor)
+            .observing(self.builder.row(&self.channel_key(i, spec), &spec.at, 1)?)
             .with_resolution(spec.resolution);
         let input = &experiment.input;
-        if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
+        // Inputs at the samples are those of one coordinate.
+        let has_inputs = experiment.excitation.is_some() && self.coordinates() == 1;
+        if spec.kind == ChannelKind::Acceleration && has_inputs {
             channel = channel.with_shared_inputs(input.inputs_at(times));
         }
         if let Some(base) = self.base_motion(spec, input)? {
@@ -287,7 +324,8 @@ impl ExperimentBuilder<'_> {
                     .expected("no `absolute`")),
             };
         }
-        if !asked.unwrap_or(kind == ChannelKind::Acceleration) {
+        let is_absolute = kind == ChannelKind::Acceleration && spec.at.len() < 2;
+        if !asked.unwrap_or(is_absolute) {
             return Ok(None);
         }
         let response = spec.times.iter().map(|t| input.base_motion_at(kind, *t));
@@ -302,7 +340,7 @@ impl ExperimentBuilder<'_> {
     /// Returns gain, offset (in the unit of the channel) and drift (per s) of a sensor.
     fn sensor(
         &self,
-        channel: &ChannelSpec,
+        (i, channel): (usize, &ChannelSpec),
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Sensor, BuildError> {
         let SensorSpec {
@@ -328,12 +366,16 @@ impl ExperimentBuilder<'_> {
         let deviation = (squares.sum::<f64>() / count).sqrt();
         let unit = channel.kind.unit_of(channel.angular);
         let per_second = format!("{unit}/s");
-        let key = format!("{}.sensors.{kind}", self.key);
+        let key = self.channel_key(i, channel);
+        let of = match channel.at.as_slice() {
+            [] => String::new(),
+            names => format!(" at {}", names.join(" and ")),
+        };
         let mut value =
             |part: &str, spec: Option<ScalarSpec>, unit, [default, start, scale]: [f64; 3]| {
                 let scalar = PendingScalar {
                     key: format!("{key}.{part}"),
-                    name: format!("{part} of the {kind} of {}", self.record.name),
+                    name: format!("{part} of the {kind}{of} of {}", self.record.name),
                     unit,
                     start,
                     scale,
@@ -359,7 +401,7 @@ impl ExperimentBuilder<'_> {
                 .found("0")
                 .expected("another number, or `estimate`"));
         }
-        if self.is_equation_error && sensor.is_estimated() {
+        if self.builder.is_equation_error() && sensor.is_estimated() {
             let problem = "the method `equation-error` needs sensors with known parameters";
             return Err(BuildError::new(key, problem)
                 .found("`estimate`")

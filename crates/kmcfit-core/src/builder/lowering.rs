@@ -9,7 +9,7 @@ use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::signal::even_spacing;
 use crate::solvers::{Measurements, estimate_states};
-use crate::structure::{Law, Structure};
+use crate::structure::Structure;
 use crate::system::{Grid, System};
 use std::sync::Arc;
 
@@ -64,7 +64,7 @@ impl Builder {
         let system = System {
             grid,
             method: self.method,
-            structure: Structure::one(self.terms()?),
+            structure: self.build_structure()?,
         };
         let mut scalars = Vec::new();
         let mut validation = Vec::new();
@@ -75,8 +75,7 @@ impl Builder {
                 record,
                 grid: &grid,
                 coefficient_set: coefficient_sets.of_record[i],
-                is_equation_error: self.is_equation_error(),
-                is_simulation: self.is_simulation,
+                builder: self,
             };
             if record.validation {
                 let mut own = Vec::new();
@@ -91,9 +90,9 @@ impl Builder {
         let weight_search = self.add_penalties(&mut problem, measured.as_deref(), &mut notices)?;
         let mut rows = Vec::new();
         let starts = problem.functions.values(&problem.start());
-        for (entry, start) in self.entries().iter().zip(&starts) {
+        for (j, (entry, start)) in self.entries().iter().zip(&starts).enumerate() {
             let coefficient_set = entry.owner.map_or(0, |i| coefficient_sets.of_record[i]);
-            for constraint in of_bounds(entry, start, coefficient_set) {
+            for constraint in of_bounds(entry, j, start, coefficient_set) {
                 self.add(&constraint, &mut problem, &mut rows, &mut notices)?;
             }
         }
@@ -191,14 +190,21 @@ impl Builder {
         (same && even_spacing(first).is_some()).then_some(first)
     }
 
-    /// Force terms of the system.
-    fn terms(&self) -> Result<Vec<Law>, BuildError> {
-        let mut terms = Vec::new();
-        let is_term = |entry: &&FunctionEntry| entry.owner.is_none() && !entry.is_known_part;
-        for entry in self.entries().iter().filter(is_term) {
-            terms.extend(entry.kind.law(entry.width()?));
+    /// The structure of the system.
+    fn build_structure(&self) -> Result<Structure, BuildError> {
+        let (mut inertias, mut elements) = (Vec::new(), Vec::new());
+        let is_shared = |entry: &&FunctionEntry| entry.owner.is_none() && !entry.is_known_part;
+        let entries = self.entries();
+        for (entry, function) in entries.iter().filter(is_shared).zip(&self.functions) {
+            let ends = function.ends.clone();
+            match entry.kind.law(entry.width()?) {
+                None => inertias.push(ends),
+                Some(law) => elements.push((law, ends)),
+            }
         }
-        Ok(terms)
+        let count = self.coordinates.len().max(1);
+        let structure = Structure::new(count, 0, inertias, elements);
+        structure.map_err(|why| BuildError::new("structure", why.to_string()))
     }
 
     /// Functions on the grid.
@@ -212,6 +218,7 @@ impl Builder {
         for entry in self.entries() {
             let mut function = entry.spec.on(entry.kind, &entry.key, grid)?;
             function.owner = entry.owner.map(|i| self.records[i].name.clone());
+            function.label = (!self.coordinates.is_empty()).then(|| entry.name.to_owned());
             function.is_known_part = entry.is_known_part;
             list.push(function);
         }
@@ -257,7 +264,9 @@ impl Builder {
 
     /// Sets initial states without a start or prior to those estimated from the samples.
     fn start_at_samples(&self, problem: &mut Problem) {
-        if problem.experiments.iter().all(|e| e.begins_known()) {
+        // The estimated states are those of one coordinate.
+        let is_one = problem.system.structure.is_one();
+        if !is_one || problem.experiments.iter().all(|e| e.begins_known()) {
             return;
         }
         let fitted = self.records.iter().filter(|record| !record.validation);

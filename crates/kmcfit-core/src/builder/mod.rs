@@ -45,6 +45,7 @@ mod lowering;
 mod notice;
 mod penalties;
 mod record;
+mod structure;
 mod variations;
 
 pub use coefficient::UNKNOWN_MASS;
@@ -60,12 +61,16 @@ use crate::model::{CoefficientSpec, ConstraintSpec};
 use crate::problem::Problem;
 use crate::solvers::Solver;
 use crate::system::{Grid, Method, State};
+use coefficient_sets::Function;
 use constraints::StatedConstraint;
 
 /// Specification of a problem.
 #[derive(Debug, Clone)]
 pub struct Builder {
-    coefficients: Vec<(CoefficientKind, CoefficientSpec)>,
+    /// Names of the coordinates of a structure; empty for one coordinate.
+    coordinates: Vec<String>,
+    /// Shared functions, masses first.
+    functions: Vec<Function>,
     records: Vec<Record>,
     nodes: Option<usize>,
     grid: Option<Grid>,
@@ -90,7 +95,8 @@ impl Builder {
     /// A system with these coefficient functions, mass first, in the order of [`CoefficientKind::ALL`].
     pub fn of(coefficients: Vec<(CoefficientKind, CoefficientSpec)>) -> Self {
         Self {
-            coefficients,
+            coordinates: Vec::new(),
+            functions: coefficients.into_iter().map(Function::one).collect(),
             records: Vec::new(),
             nodes: None,
             grid: None,
@@ -141,11 +147,11 @@ impl Builder {
     /// Sets a coefficient function; replaces an earlier one of its kind.
     #[must_use]
     pub fn coefficient(mut self, kind: CoefficientKind, spec: CoefficientSpec) -> Self {
-        self.coefficients.retain(|(known, _)| *known != kind);
+        self.functions.retain(|known| known.kind != kind);
         let position = |kind: CoefficientKind| CoefficientKind::ALL.iter().position(|k| *k == kind);
-        let is_before = |(known, _): &(CoefficientKind, _)| position(*known) < position(kind);
-        let at = self.coefficients.partition_point(is_before);
-        self.coefficients.insert(at, (kind, spec));
+        let is_before = |known: &Function| position(known.kind) < position(kind);
+        let at = self.functions.partition_point(is_before);
+        self.functions.insert(at, Function::one((kind, spec)));
         self
     }
 
@@ -242,6 +248,7 @@ impl Builder {
             statement,
             soft,
             coefficient_set: 0,
+            function: None,
         });
         self
     }

@@ -38,6 +38,9 @@ pub struct ChannelSpec {
     pub span: [f64; 2],
     /// True for a rotation, which determines the names of units.
     pub angular: bool,
+    /// What is observed of a structure: a coordinate, the second of two ends less the first, or the elongation of an element; the only
+    /// coordinate where it is empty.
+    pub at: Vec<String>,
 }
 
 impl ChannelSpec {
@@ -56,6 +59,7 @@ impl ChannelSpec {
             filter: Vec::new(),
             span: [end(times.first()), end(times.last())],
             angular: false,
+            at: Vec::new(),
         }
     }
 
@@ -151,6 +155,8 @@ impl ChannelSpec {
 pub struct Record {
     pub(super) name: String,
     pub(super) initial: [ScalarSpec; 2],
+    pub(super) initial_of: Vec<(String, [ScalarSpec; 2])>,
+    pub(super) force_at: Option<String>,
     pub(super) channels: Vec<ChannelSpec>,
     pub(super) coefficients: Vec<(CoefficientKind, CoefficientSpec)>,
     pub(super) validation: bool,
@@ -168,6 +174,8 @@ impl Record {
         Self {
             name: name.into(),
             initial: [ScalarSpec::ESTIMATED; 2],
+            initial_of: Vec::new(),
+            force_at: None,
             channels: Vec::new(),
             coefficients: Vec::new(),
             validation: false,
@@ -198,6 +206,29 @@ impl Record {
     #[must_use]
     pub fn initial(mut self, state: [ScalarSpec; 2]) -> Self {
         self.initial = state;
+        self
+    }
+
+    /// Sets the initial displacement (m) and velocity (m/s) of a coordinate of a structure; others have those of [`Record::initial`].
+    #[must_use]
+    pub fn initial_of(mut self, coordinate: &str, state: [ScalarSpec; 2]) -> Self {
+        self.initial_of.push((coordinate.to_owned(), state));
+        self
+    }
+
+    /// Sets the coordinate of a structure on which the force acts; the first one unless set.
+    #[must_use]
+    pub fn force_at(mut self, coordinate: &str) -> Self {
+        self.force_at = Some(coordinate.to_owned());
+        self
+    }
+
+    /// Sets what the last channel observes of a structure, see [`ChannelSpec::at`].
+    #[must_use]
+    pub fn at(mut self, names: &[&str]) -> Self {
+        if let Some(channel) = self.channels.last_mut() {
+            channel.at = names.iter().map(|name| (*name).to_owned()).collect();
+        }
         self
     }
 
@@ -329,7 +360,14 @@ impl Record {
     /// Error for invalid records; `key` is that of the record. The equation error has no sum of misfits to check.
     pub(super) fn check(&self, key: &str, is_equation_error: bool) -> Result<(), BuildError> {
         self.channels.iter().try_for_each(|c| c.check(key))?;
-        for (scalar, name) in self.initial.iter().zip(["displacement", "velocity"]) {
+        let states = self
+            .initial_of
+            .iter()
+            .map(|(_, state)| state)
+            .chain([&self.initial]);
+        let named =
+            |state| std::iter::zip::<&[ScalarSpec; 2], _>(state, ["displacement", "velocity"]);
+        for (scalar, name) in states.flat_map(named) {
             if let ScalarSpec::Known(value) = scalar
                 && !value.is_finite()
             {

@@ -36,6 +36,8 @@ use std::sync::Arc;
 pub struct CoefficientFunction {
     /// Kind.
     pub quantity: CoefficientKind,
+    /// Name of the element, or of the mass of a coordinate, in a structure; `None` for that of the kind.
+    pub label: Option<String>,
     /// Name of the experiment with its own function; `None` for a function of the shared coefficient set.
     pub owner: Option<String>,
     /// True for a known part, which a coefficient set adds to another function of the same kind.
@@ -60,6 +62,7 @@ impl CoefficientFunction {
     pub fn fixed(quantity: CoefficientKind, values: Vec<f64>) -> Self {
         Self {
             quantity,
+            label: None,
             owner: None,
             is_known_part: false,
             prior: None,
@@ -104,6 +107,7 @@ impl CoefficientFunction {
     ) -> Self {
         Self {
             quantity,
+            label: None,
             owner: None,
             is_known_part: false,
             prior: None,
@@ -129,15 +133,16 @@ impl CoefficientFunction {
         self.offset.get(i).copied().unwrap_or(0.0)
     }
 
-    /// Name in reports: kind and, if any, its experiment.
+    /// Name in reports: that of its element, or its kind, and, if any, its experiment.
     pub fn name(&self) -> String {
         let part = match self.is_known_part {
             true => "known part of ",
             false => "",
         };
+        let name = self.label.as_deref().unwrap_or(self.quantity.name());
         match &self.owner {
-            None => format!("{part}{}", self.quantity.name()),
-            Some(owner) => format!("{part}{} of {owner}", self.quantity.name()),
+            None => format!("{part}{name}"),
+            Some(owner) => format!("{part}{name} of {owner}"),
         }
     }
 

@@ -1,8 +1,9 @@
 //! Keys of an experiment: data file, channels, noise and initial state.
 
 use super::{
-    BaseSpec, ByCoefficient, ColumnId, EstimateWord, ForceSpec, InputSigmaSpec, NoisesSpec,
-    OneOrList, Own, RangeSpec, ScalarOr, ScalarSpec, SensorsSpec, SigmaValue, words,
+    BaseSpec, ByCoefficient, ColumnId, EstimateWord, ForceAtSpec, ForceSpec, InputSigmaSpec,
+    NoisesSpec, OneOrList, Own, RangeSpec, ScalarOr, ScalarSpec, SensorsSpec, SigmaValue,
+    StructureChannelSpec, words,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -100,10 +101,20 @@ pub struct ExperimentSpec {
     /// Force on the mass: interpolation of the column `force`, or a waveform in its place.
     #[schemars(extend("example" = "{interpolation: cubic}", "default" = "none, or the column `force`"))]
     pub force: Option<ForceSpec>,
-    /// Interpolation of the base motion.
+    /// Forces on coordinates of a structure; at most one.
+    #[schemars(extend("example" = "[{column: f_N, at: floor_3}]", "default" = "none", "needs" = "`structure`"))]
+    pub forces: Option<Vec<ForceAtSpec>>,
+    /// Channels that observe a structure.
+    #[schemars(extend(
+        "example" = "[{column: a1_g, acceleration: floor_1, sigma: estimate}]",
+        "default" = "none",
+        "needs" = "`structure`; no `sigma`, `loss`, `noise` or `sensors` of the experiment"
+    ))]
+    pub channels: Option<Vec<StructureChannelSpec>>,
+    /// Interpolation of the base motion, or its column.
     #[schemars(extend(
         "example" = "{interpolation: cubic}",
-        "needs" = "`columns.base_acceleration` or `columns.base_displacement`"
+        "needs" = "`column`, `columns.base_acceleration` or `columns.base_displacement`"
     ))]
     pub base: Option<BaseSpec>,
     /// Initial state, or `estimate` for displacement and velocity.

@@ -1,6 +1,6 @@
 //! Keys of the force and of the motion of the base.
 
-use super::words;
+use super::{ColumnRef, words};
 use crate::signal::Interpolation;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -65,6 +65,15 @@ words! {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "base", extend("expecting" = "a map such as {interpolation: cubic}"))]
 pub struct BaseSpec {
+    /// Column of the motion, in place of `columns.base_acceleration` or `columns.base_displacement`.
+    #[schemars(extend("example" = "table_g"))]
+    pub column: Option<ColumnRef>,
+    /// True for a column of displacements, false for accelerations.
+    #[schemars(extend("example" = "true", "default" = "false", "needs" = "`column`"))]
+    pub displacement: Option<bool>,
+    /// Unit of `column`.
+    #[schemars(extend("example" = "g", "default" = "as stated in the file, else SI", "needs" = "`column`"))]
+    pub unit: Option<String>,
     /// Interpolation of the base column.
     #[schemars(extend("example" = "cubic", "default" = "linear"))]
     pub interpolation: Option<Interpolation>,

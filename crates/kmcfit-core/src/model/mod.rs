@@ -6,6 +6,7 @@
 //! concern several keys are checked where the model is lowered to a problem.
 
 mod by_coefficient;
+mod channels;
 mod experiment;
 mod fit;
 mod functions;
@@ -13,11 +14,13 @@ mod input;
 mod noise;
 mod parts;
 mod sensors;
+mod structure;
 mod study;
 mod values;
 
 pub use by_coefficient::{ByCoefficient, Shared};
 pub(crate) use by_coefficient::{Own, TruthColumns};
+pub use channels::{ForceAtSpec, StructureChannelSpec};
 pub use experiment::{
     ColumnRef, DecimalSign, Delimiter, Duplicates, ExperimentSpec, FaultName, InitialSpec,
     LossName, LossSpec, SourceSpec,
@@ -25,7 +28,7 @@ pub use experiment::{
 pub(crate) use fit::FitSpec;
 pub use fit::{FitMethod, StopSpec};
 pub use functions::{BasisName, CoefficientSpec, PenaltyKind, PenaltySpec};
-pub(crate) use input::BaseSpec;
+pub use input::BaseSpec;
 pub use input::{ForceShape, ForceSpec};
 pub(crate) use noise::NoisesSpec;
 pub use noise::{CorrelationName, CorrelationSpec, InputErrorName, InputSigmaSpec};
@@ -33,6 +36,7 @@ pub use parts::{ConstraintSpec, StateSpec};
 pub(crate) use parts::{GridSpec, RangeSpec, TruthSpec};
 pub use sensors::{DelayValue, InputSensorSpec, ScalarSpec, SensorSpec};
 pub(crate) use sensors::{EstimateSpec, SensorsSpec};
+pub use structure::{CoordinateSpec, ElementSpec, Named, StructureSpec};
 pub use study::{CandidateSpec, EquivalentSpec, ProfileSpec, StudySpec};
 pub use values::{
     AutoWord, Bound, ColumnId, ColumnSpec, KnotSpec, KnownValue, KnownValueMap, Nodes,
@@ -60,11 +64,18 @@ pub struct ModelSpec {
     /// Time grid and stepper.
     #[schemars(extend("example" = "{nodes: 2000, method: midpoint}", "default" = "one node per sample, rk4"))]
     pub grid: Option<GridSpec>,
-    /// Coefficient functions of the equation of motion.
+    /// Coefficient functions of the equation of motion of one coordinate.
     #[schemars(extend(
         "example" = "{mass: {fixed: 1.0}, damping: {basis: constant, start: 0.0}, stiffness: {basis: constant, start: 1.0}}"
     ))]
-    pub functions: ByCoefficient<Shared>,
+    pub functions: Option<ByCoefficient<Shared>>,
+    /// A system of several coordinates, in place of `functions`.
+    #[schemars(extend(
+        "example" = "{coordinates: {floor_1: {mass: {fixed: 1.0}}}, elements: {storey_1: {spring: [ground, floor_1], start: 3000.0}}}",
+        "default" = "one coordinate with `functions`",
+        "needs" = "no `functions`, `constraints`, `truth`, `predict` or `study`"
+    ))]
+    pub structure: Option<StructureSpec>,
     /// Constraints on the functions beyond their own `min` and `max`; one map for each.
     #[schemars(extend("example" = "[{function: mass, shape: non-increasing}]", "default" = "none"))]
     pub constraints: Option<Vec<ConstraintSpec>>,

@@ -176,7 +176,7 @@ mod tests {
         let signal = Signal::new(times, forces, Interpolation::Hold).expect("a signal");
         let input = Input {
             force: Some(Waveform::Samples(signal)),
-            base: None,
+            ..Input::default()
         };
         let channel = |kind, times: Vec<f64>| {
             let values = times.iter().map(|t| (2.0 * t).cos()).collect();

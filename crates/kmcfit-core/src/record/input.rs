@@ -30,6 +30,10 @@ pub struct Input {
     pub force: Option<Waveform>,
     /// The motion of the base.
     pub base: Option<BaseMotion>,
+    /// Index of the coordinate on which the force acts.
+    pub coordinate: usize,
+    /// Index of the last coordinate: all are relative to the base.
+    pub last: usize,
 }
 
 impl Input {
@@ -55,18 +59,27 @@ impl Input {
             };
             StageSamples::new((0..nodes - 1).map(step))
         };
-        Excitation::one(
-            self.force.as_ref().map(|force| match force {
-                Waveform::Samples(s) => interpolated(s),
-                Waveform::Shape(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
-            }),
-            self.base.as_ref().map(|base| match base {
-                BaseMotion::Acceleration(s) => interpolated(s),
-                BaseMotion::Displacement(s) => {
-                    sample(&|t| s.second_derivative(t), &|t| s.second_derivative(t))
-                }
-            }),
-        )
+        let force = self.force.as_ref().map(|force| match force {
+            Waveform::Samples(s) => interpolated(s),
+            Waveform::Shape(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+        });
+        let base = self.base.as_ref().map(|base| match base {
+            BaseMotion::Acceleration(s) => interpolated(s),
+            BaseMotion::Displacement(s) => {
+                sample(&|t| s.second_derivative(t), &|t| s.second_derivative(t))
+            }
+        });
+        let frames = base
+            .iter()
+            .flat_map(|base| (0..=self.last).map(|j| (j, base.clone())));
+        Excitation {
+            frames: frames.collect(),
+            forces: force
+                .into_iter()
+                .map(|force| (self.coordinate, force))
+                .collect(),
+            supports: Vec::new(),
+        }
     }
 
     /// Shares `times` (s) with the signals that have the same.

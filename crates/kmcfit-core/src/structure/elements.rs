@@ -119,6 +119,8 @@ fn corner<T: Real>(u: T, width: f64) -> T {
 pub struct CoefficientRow {
     /// Key in a model file and in `result.json`.
     pub name: &'static str,
+    /// Key of an element with its law in a structure; `None` for the mass.
+    pub element: Option<&'static str>,
     /// Symbol in the equation of motion.
     pub symbol: &'static str,
     /// In a sentence, with its article.
@@ -141,6 +143,7 @@ pub struct CoefficientRow {
 const TABLE: [CoefficientRow; 10] = [
     CoefficientRow {
         name: "mass",
+        element: None,
         symbol: "m",
         words: "the mass",
         text: "Mass m(t).",
@@ -152,6 +155,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "damping",
+        element: Some("damper"),
         symbol: "c",
         words: "damping",
         text: "Damping c(t), with the force c y'.",
@@ -163,6 +167,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "stiffness",
+        element: Some("spring"),
         symbol: "k",
         words: "a stiffness",
         text: "Stiffness k(t), with the force k y.",
@@ -174,6 +179,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "quadratic_stiffness",
+        element: Some("quadratic_spring"),
         symbol: "k2",
         words: "a quadratic stiffness",
         text: "Quadratic stiffness k2(t), with the force k2 y^2: the asymmetric part of a spring.",
@@ -185,6 +191,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "cubic_stiffness",
+        element: Some("cubic_spring"),
         symbol: "k3",
         words: "a cubic stiffness",
         text: "Cubic stiffness k3(t), with the force k3 y^3.",
@@ -196,6 +203,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "quintic_stiffness",
+        element: Some("quintic_spring"),
         symbol: "k5",
         words: "a quintic stiffness",
         text: "Quintic stiffness k5(t), with the force k5 y^5.",
@@ -207,6 +215,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "quadratic_damping",
+        element: Some("quadratic_damper"),
         symbol: "c2",
         words: "quadratic damping",
         text: "Quadratic damping c2(t), with the force c2 |y'| y'.",
@@ -218,6 +227,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "coulomb_friction",
+        element: Some("friction"),
         symbol: "F_c",
         words: "Coulomb friction",
         text: "Coulomb friction, with the force f y'/sqrt(y'^2 + width^2), width in m/s.",
@@ -231,6 +241,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "static_force",
+        element: Some("static_force"),
         symbol: "F_0",
         words: "a static force",
         text: "Static force, which acts against positive y.",
@@ -242,6 +253,7 @@ const TABLE: [CoefficientRow; 10] = [
     },
     CoefficientRow {
         name: "gap_stiffness",
+        element: Some("gap_spring"),
         symbol: "k_g",
         words: "a spring beyond a gap",
         text: "Stiffness of a spring that acts beyond a clearance of `width` (m) on both sides.",

@@ -46,6 +46,7 @@ mod smooth_functions;
 mod soft;
 mod start_strategy;
 mod statistics;
+mod structure_builder;
 mod structures;
 mod study;
 mod total_variation_jumps;

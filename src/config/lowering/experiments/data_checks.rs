@@ -239,7 +239,14 @@ fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<Finding> {
 
 /// The mass that the measured force and the first channel imply, where it differs from the stated one by the factor between two units.
 fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<Finding> {
-    let stated = match (file.spec.functions.get(CoefficientKind::MASS)?.fixed).as_ref()? {
+    let stated = match (file
+        .spec
+        .functions
+        .as_ref()?
+        .get(CoefficientKind::MASS)?
+        .fixed)
+        .as_ref()?
+    {
         KnownValue::Number(number) => *number,
         KnownValue::Map(map) => map.value?,
         KnownValue::Unknown(_) | KnownValue::History(_) => return None,

@@ -7,7 +7,7 @@ use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::lowering::ModelKey;
 use crate::error::InputError;
 use crate::units::Measurand;
-use kmcfit_core::model::{ExperimentSpec, ForceShape, ForceSpec};
+use kmcfit_core::model::{BaseSpec, ExperimentSpec, ForceShape, ForceSpec};
 use kmcfit_core::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 use std::ops::Range;
@@ -17,7 +17,18 @@ pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Input, InputEr
     let (at, spec) = (&entry.at, entry.spec);
     let columns = spec.columns.as_ref();
     let units = spec.units.as_ref();
+    let at_coordinate = match spec.forces.as_deref() {
+        None | Some([]) => None,
+        Some([force]) => Some(force),
+        Some(several) => {
+            return Err(at
+                .error_in("forces[1]", "only one force can act on a structure")
+                .found(format!("{} forces", several.len()))
+                .expected("one of them"));
+        }
+    };
     let force_column = columns.and_then(|c| c.force.as_ref());
+    let force_column = force_column.or(at_coordinate.map(|force| &force.column));
     let force = match (force_column, &spec.force) {
         (None, None) => None,
         (None, Some(force)) => Some(Waveform::Shape(shape(at, force)?)),
@@ -29,12 +40,14 @@ pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Input, InputEr
                     .expected("one of the two"));
             }
             let interpolation = force.as_ref().and_then(|f| f.interpolation);
+            let interpolation = interpolation.or(at_coordinate.and_then(|f| f.interpolation));
             let wanted = ColumnRequest {
                 entry,
                 name: "force",
                 kind: Measurand::Force,
                 column,
-                unit: units.and_then(|u| u.force.as_ref()),
+                unit: (at_coordinate.and_then(|f| f.unit.as_ref()))
+                    .or(units.and_then(|u| u.force.as_ref())),
                 beside: None,
             };
             let meant = interpolation.unwrap_or_default();
@@ -42,7 +55,11 @@ pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Input, InputEr
         }
     };
     let base = base(entry, notes)?;
-    Ok(Input { force, base })
+    Ok(Input {
+        force,
+        base,
+        ..Input::default()
+    })
 }
 
 fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>, InputError> {
@@ -51,7 +68,17 @@ fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>
     let units = spec.units.as_ref();
     let acceleration = columns.and_then(|c| c.base_acceleration.as_ref());
     let displacement = columns.and_then(|c| c.base_displacement.as_ref());
-    let interpolation = spec.base.as_ref().and_then(|b| b.interpolation);
+    let own = spec.base.as_ref();
+    let interpolation = own.and_then(|b| b.interpolation);
+    let of_base = |is_meant: bool| {
+        let is_displacement = |b: &&BaseSpec| b.displacement.unwrap_or(false) == is_meant;
+        own.filter(is_displacement).and_then(|b| b.column.as_ref())
+    };
+    let (acceleration, displacement) = (
+        acceleration.or(of_base(false)),
+        displacement.or(of_base(true)),
+    );
+    let unit = own.and_then(|b| b.unit.as_ref());
     let (column, kind) = match (acceleration, displacement) {
         (None, None) if spec.base.is_none() => return Ok(None),
         (None, None) => {
@@ -80,7 +107,7 @@ fn base(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Option<BaseMotion>
         beside: None,
     };
     if kind == Measurand::Acceleration {
-        let unit = units.and_then(|u| u.base_acceleration.as_ref());
+        let unit = unit.or(units.and_then(|u| u.base_acceleration.as_ref()));
         let wanted = wanted("base_acceleration", unit, kind);
         let meant = interpolation.unwrap_or_default();
         return signal(&wanted, meant, notes).map(|signal| Some(BaseMotion::Acceleration(signal)));

@@ -47,6 +47,7 @@ impl RawRecord {
             Input {
                 force: Some(Waveform::Samples(signal)),
                 base: None,
+                ..
             } => Some(signal),
             _ => None,
         }
@@ -259,6 +260,9 @@ pub(super) fn specification(
         InitialSpec::Map(state) => [state.displacement, state.velocity],
     };
     let mut found = Record::new(entry.name()).initial(initial);
+    if let Some(force) = spec.forces.iter().flatten().next() {
+        found = found.force_at(&force.at);
+    }
     if is_held_out(spec) {
         found = found.validation();
     }
@@ -283,7 +287,7 @@ pub(super) fn specification(
         for raw in record.channels {
             notes.push(raw.note());
             let delay = delays::of_channel(entry, raw.kind, raw.median_spacing)?;
-            found = found.channel(channel(spec, raw, delay.start()));
+            found = found.channel(channel(raw, delay.start()));
         }
     }
     Ok((found, notes))
@@ -310,10 +314,8 @@ fn input_sigma<'a>(
     }
 }
 
-fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<f64>) -> ChannelSpec {
-    let mut sensor = channel::sensor_of(spec, raw.kind)
-        .cloned()
-        .unwrap_or_default();
+fn channel(raw: RawChannel, delay: Option<f64>) -> ChannelSpec {
+    let mut sensor = raw.sensor;
     // Known delays have been taken off the times of the samples.
     sensor.delay = delay.map(DelayValue::starting_at);
     ChannelSpec {
@@ -328,6 +330,7 @@ fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<f64>) -> Channe
         angular: raw.unit.is_angular(),
         times: raw.times,
         values: raw.values,
+        at: raw.at,
     }
 }
 

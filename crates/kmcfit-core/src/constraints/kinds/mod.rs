@@ -218,38 +218,54 @@ impl Constraint {
         let indices: Vec<usize> = (about.iter())
             .map(|q| all.index(*q))
             .collect::<Result<_, _>>()?;
+        self.rows_of(&all, &indices)
+    }
+
+    /// [`Constraint::build_for`] of the function with this index.
+    pub(crate) fn build_of(
+        &self,
+        grid: &Grid,
+        functions: &Parameterization,
+        set: usize,
+        function: usize,
+    ) -> Result<Constraints, ConstraintError> {
+        self.rows_of(&All::new(grid, functions, set), &[function])
+    }
+
+    /// Its rows for the functions with these indices.
+    fn rows_of(&self, all: &All<'_>, indices: &[usize]) -> Result<Constraints, ConstraintError> {
         if indices.iter().all(|&j| all.list[j].parameters() == 0) {
-            return Err(ConstraintError::Fixed(about));
+            return Err(ConstraintError::Fixed(self.functions()));
         }
         let mut found = Constraints::default();
-        match (self, indices.as_slice()) {
+        match (self, indices) {
             (Constraint::Bounds { min, max, .. }, &[j]) => {
-                found.groups = bounds::build(&all, j, min.as_ref(), max.as_ref())?;
+                found.groups = bounds::build(all, j, min.as_ref(), max.as_ref())?;
             }
             (Constraint::Slope { min, max, .. }, &[j]) => {
-                found.groups = slope::build(&all, j, *min, *max)?;
+                found.groups = slope::build(all, j, *min, *max)?;
             }
             (Constraint::Shape { shape, .. }, &[j]) => {
-                found.groups = vec![shape::build(&all, j, *shape)?];
+                found.groups = vec![shape::build(all, j, *shape)?];
             }
             (Constraint::Value { at, value, .. }, &[j]) => {
-                found.groups = vec![values::build(&all, j, *at, *value)?];
+                found.groups = vec![values::build(all, j, *at, *value)?];
             }
             (Constraint::Mean { value, .. }, &[j]) => {
-                found.groups = vec![totals::mean(&all, j, *value)?];
+                found.groups = vec![totals::mean(all, j, *value)?];
             }
             (Constraint::Integral { value, .. }, &[j]) => {
-                found.groups = vec![totals::integral(&all, j, *value)?];
+                found.groups = vec![totals::integral(all, j, *value)?];
             }
             (Constraint::Equal { ratio, .. }, &[a, b]) => {
-                found.groups = vec![equal::build(&all, [a, b], *ratio)?];
+                found.groups = vec![equal::build(all, [a, b], *ratio)?];
             }
-            (Constraint::Passive, &[m, c, k]) => found.groups = passive::build(&all, [m, c, k])?,
+            (Constraint::Passive, &[m, c, k]) => found.groups = passive::build(all, [m, c, k])?,
             (Constraint::Frequency { min, max }, &[m, k]) => {
-                found.groups = frequency::build(&all, [m, k], *min, *max)?;
+                found.groups = frequency::build(all, [m, k], *min, *max)?;
             }
             (Constraint::DampingRatio { max }, &[m, c, k]) => {
-                found.cones = vec![damping_ratio::build(&all, [m, c, k], *max)];
+                found.cones = vec![damping_ratio::build(all, [m, c, k], *max)];
             }
             _ => unreachable!("one index for each function of a statement"),
         }

@@ -91,7 +91,7 @@ fn within(seed: u64, varies: bool) -> [usize; 2] {
     let signal = Signal::new(times.clone(), force, Interpolation::Linear).unwrap();
     experiment.input = Input {
         force: Some(Waveform::Samples(signal)),
-        base: None,
+        ..Input::default()
     };
     experiment.excitation = Some(experiment.input.on(&grid, grid.nodes()));
     let channel = Channel::new(

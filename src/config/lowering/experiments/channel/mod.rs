@@ -13,7 +13,7 @@ use crate::error::InputError;
 use crate::units::Unit;
 use kmcfit_core::model::{
     ColumnId, ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec,
-    ScalarOr, SensorSpec, SigmaValue,
+    ScalarOr, SensorSpec, SigmaValue, StructureChannelSpec,
 };
 use kmcfit_core::number_format::{count, significant};
 use kmcfit_core::record::{ChannelKind, Loss, NoiseModel, Weighting};
@@ -50,6 +50,10 @@ pub struct RawChannel {
     pub loss: Loss,
     /// Correlation of the noise.
     pub noise: NoiseModel,
+    /// Sensor, as stated.
+    pub sensor: SensorSpec,
+    /// What is observed of a structure.
+    pub at: Vec<String>,
     pub unit: Unit,
     /// Unit of the column of times; `None` for a sampling rate.
     pub time_unit: Option<Unit>,
@@ -111,6 +115,13 @@ pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec
 /// Reads all channels of an experiment.
 pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Vec<RawChannel>, InputError> {
     let spec = entry.spec;
+    if let Some(list) = &spec.channels {
+        return list
+            .iter()
+            .enumerate()
+            .map(|channel| of_structure(entry, channel, notes))
+            .collect();
+    }
     let named: Vec<ChannelKind> = (ChannelKind::ALL.into_iter())
         .filter(|kind| spec_of(spec, *kind).column.is_some())
         .collect();
@@ -128,6 +139,39 @@ pub fn read(entry: &Entry<'_>, notes: &mut RecordNotes) -> Result<Vec<RawChannel
         }
     }
     Ok(channels)
+}
+
+/// Reads a channel that observes a structure.
+fn of_structure(
+    entry: &Entry<'_>,
+    (i, given): (usize, &StructureChannelSpec),
+    notes: &mut RecordNotes,
+) -> Result<RawChannel, InputError> {
+    let observed = given.observed();
+    let [(kind, at)] = observed.as_slice() else {
+        let key = format!("channels[{i}]");
+        return Err(entry
+            .at
+            .error_in(&key, "a channel observes one quantity")
+            .found(match observed.len() {
+                0 => "none".to_owned(),
+                several => format!("{several} quantities"),
+            })
+            .expected("one of `displacement`, `velocity`, `acceleration` and `elongation`"));
+    };
+    let sensor = given.sensor();
+    let spec = Spec {
+        kind: *kind,
+        column: None,
+        unit: given.unit.as_ref(),
+        sigma: given.sigma.as_ref(),
+        loss: given.loss.as_ref(),
+        noise: given.noise.as_ref(),
+        sensor: Some(&sensor),
+    };
+    let channel = read_one(entry, &spec, &given.column, notes)?;
+    let at = at.clone();
+    Ok(RawChannel { at, ..channel })
 }
 
 /// True if `columns` names an excitation, or the time only.
@@ -251,6 +295,8 @@ fn read_one(
         filter,
         loss,
         noise: noise_model(of_kind),
+        sensor: of_kind.sensor.cloned().unwrap_or_default(),
+        at: Vec::new(),
         unit: source.unit,
         time_unit: source.time_unit,
         resolution: step.unwrap_or(0.0),
