@@ -564,7 +564,7 @@ fn a_jump_of_the_stiffness_is_found_with_its_time() {
             let number = found.and_then(|found| found[key].as_f64());
             number.expect("a number")
         });
-        // 1.96 standard errors; the noise of the force, which the first step does not have, adds to them.
+        // The 95 % intervals of the first step, which take the force as exact.
         assert!(
             (value - truth).abs() < 1.96 * error,
             "{quantity}: {value} {error}"
